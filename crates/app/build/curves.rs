@@ -66,7 +66,8 @@ impl Curves {
     }
 
     /// What is not wrong with a curve, but seldom meant.
-    pub(super) fn warnings(&self) -> Vec<String> {
+    pub(super) fn warnings(&self, config: &Config) -> Vec<String> {
+        let used = |name: &String| config.regions.values().any(|region| region.material == *name);
         let warning = |(name, curve): (&String, &Arc<BhCurve>)| {
             let [h, b] = curve.end().filter(|_| !curve.ends_saturated())?;
             Some({
@@ -85,9 +86,9 @@ impl Curves {
                 )
             })
         };
-        let approximation = (!self.is_static && !self.curves.is_empty()).then(|| {
-            "iron with a B–H curve above 0 Hz: each amplitude follows the curve, and of what alternates the fundamental alone is \
-             computed (effective reluctivity); that is an approximation"
+        let approximation = (!self.is_static && self.curves.keys().any(used)).then(|| {
+            "iron with a B–H curve above 0 Hz: the largest and the least |B| of a period follow the curve, and of what alternates \
+             the fundamental alone is computed (effective reluctivity); that is an approximation"
                 .to_owned()
         });
         let of_curves = self.curves.iter().flat_map(|own| [steep(own), warning(own)]);

@@ -58,9 +58,10 @@ pub(crate) fn keys_of_advice(error: &Error) -> Option<&'static str> {
 /// What to change in a configuration where a coil meets a surface as it may not; `None` where the error says it all.
 fn plane_advice(fault: &PlaneFault) -> Option<&'static str> {
     match fault {
-        PlaneFault::Crossing { .. } | PlaneFault::TangentialSource => {
-            Some("name the surface in boundaries.flux_parallel, or move the coil away")
-        }
+        PlaneFault::Crossing { .. } | PlaneFault::TangentialSource => Some(
+            "name the surface in boundaries.flux_parallel, or move the coil away; around a conductor that is an impedance \
+                 surface, make the coil a region of the mesh",
+        ),
         PlaneFault::EndsAtTerminal => Some(
             "name the surface in boundaries.flux_parallel, or let the coil close on itself with center and axis instead of \
              terminals",
@@ -205,7 +206,8 @@ impl Blame<'_> {
             SolverError::PointOutside { wanted_by: PointsOf::Expansion(name), .. } => {
                 let index = self.config.multipoles.iter().position(|own| own.name == *name)?;
                 Some(self.at(&format!("multipoles[{index}].radius"), error)?.expected(
-                    "all of the circle or ball in the mesh, or in its image behind a symmetry plane through the centre",
+                    "all of the circle or ball in the mesh, or in its image behind a symmetry plane through the centre, at right angles to a \
+                     coordinate axis",
                 ))
             }
             SolverError::Mesh(error) => self.mesh(error),

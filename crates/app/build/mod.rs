@@ -173,7 +173,7 @@ fn problem_on(
     let share = group.map(|group| share::of_mesh(config, &mesh, group)).transpose()?;
     let coils = sink.take(field::coils(config, source, &mesh))?;
     let curves = sink.take(Curves::read(config, source))?.unwrap_or_default();
-    warnings.extend(curves.warnings());
+    warnings.extend(curves.warnings(config));
     if !motion_alone {
         let coils = coils.as_deref().unwrap_or_default();
         let faults = plausible::coil_faults(config, source, &full_mesh, coils);

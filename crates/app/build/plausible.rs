@@ -358,8 +358,7 @@ fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         let goes_across = |face: &[NodeId; 3]| {
             let corners = face.map(|node| mesh.point(node));
             let (area, v) = (area_vector(corners), velocity(centroid(corners)));
-            let is_normal_to_an_axis = area.iter().any(|c| beside((c / norm(area)).abs()) < INCLINED);
-            is_normal_to_an_axis && dot(v, area).abs() > INCLINED * norm(v) * norm(area)
+            dot(v, area).abs() > INCLINED * norm(v) * norm(area)
         };
         let cut = config.boundaries.surfaces().find(|surface| {
             let faces = faces_of(topology, [surface.as_str()]);

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
+use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
@@ -112,9 +113,8 @@ fn saturated(
     let iron: Vec<ElementId> = topology.elements().filter(is_iron).collect();
     let mut found: BTreeMap<String, Saturated> = BTreeMap::new();
     for (&e, b) in iron.iter().zip(solution.flux_densities_of(model, mesh, &iron)) {
-        let magnitude = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
         let own = found.entry(topology.region_name_at(e).to_owned()).or_default();
-        own.add(volume(mesh.vertices(e)), (magnitude, share_at(&e)), centroid(mesh.vertices(e)));
+        own.add(volume(mesh.vertices(e)), (peak(b), share_at(&e)), centroid(mesh.vertices(e)));
     }
     for (index, nodes, loss) in solution.surface_losses(model, mesh) {
         let conductor = &model.conductors()[index];

@@ -87,10 +87,12 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         rows.extend(state.losses.iter().map(loss));
     }
     for (at, state) in &states {
-        let force = |BodyForce { name, force_n: [x, y, z], .. }: &BodyForce| {
-            ("force", format!("({x:.6e}, {y:.6e}, {z:.6e}) N on {}{at}", printable(name)))
-        };
-        rows.extend(state.forces.iter().map(force));
+        let vector = |[x, y, z]: [f64; 3]| format!("({x:.6e}, {y:.6e}, {z:.6e})");
+        for BodyForce { name, force_n, torque_nm, .. } in state.forces {
+            let on = format!("on {}{at}", printable(name));
+            rows.push(("force", format!("{} N {on}", vector(*force_n))));
+            rows.push(("torque", format!("{} N m {on}", vector(*torque_nm))));
+        }
     }
     for (at, state) in &states {
         let Some(saturation) = state.saturation else { continue };

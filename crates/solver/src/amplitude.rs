@@ -1,22 +1,17 @@
-//! Time-harmonic iron by the effective reluctivity of the amplitude.
+//! Time-harmonic iron: the curve at the largest and the least `|B|` of a period ([`crate::bh`]'s `phasor`).
 //!
-//! `H = ν(|B|) B` with `ν(b) = h(b)/b` of the static law, where `B` is a peak phasor and `|B|² = Bᴴ B`: the fundamental alone, as if
-//! the material followed its curve at the peak of the field. It is an approximation: real iron has harmonics. The law is no
-//! complex-differentiable function, its derivative is linear over the real numbers alone,
-//!
-//! `dH = ν dB + α B Re(Bᴴ dB)`, `α = (h' − ν)/|B|²`;
-//!
-//! with eddy currents nothing is minimised either. Newton's steps are solved by GMRES over the real numbers
-//! (`linear::gmres`), preconditioned by the complex symmetric matrix with the tensor `ν I + ½ α Re(B Bᴴ)`, the part of the
-//! derivative that such a matrix can hold. With `∂F/∂u` as of a linear problem, `dF = 2 Re(dᵀ du)`, the adjoint law is
-//! `ν L + α B̄ Re(Bᵀ L)`: the same number `Re Lᵀ dH`.
+//! It is an approximation, the fundamental alone: real iron has harmonics. The law is no complex-differentiable function, its derivative
+//! is linear over the real numbers alone, and with eddy currents nothing is minimised either. Newton's steps are solved by GMRES
+//! over the real numbers (`linear::gmres`), preconditioned by the complex symmetric matrix with the mean of the derivative over the
+//! phases, the part of it that such a matrix can hold. With `∂F/∂u` as of a linear problem, `dF = 2 Re(dᵀ du)`, the adjoint
+//! law is the conjugate of the derivative along the conjugate: the same number `Re Lᵀ dH`, for the derivative is symmetric.
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::scalar::{axpy, norm, ordered_sum};
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use rayon::prelude::*;
 
-use crate::bh::{BhCurve, Tangent};
+use crate::bh::{PhasorLaw, Tangent};
 use crate::element::Complex3;
 use crate::element::tensor::MOST_POINTS;
 use crate::error::{NonConvergence, SolverError};
@@ -44,16 +39,6 @@ const LOOSEST: f64 = 1e-2;
 /// Applications of the tangent for one system: some tens are usual, where the curve has its knee.
 const MOST_APPLICATIONS: usize = 400;
 
-/// The law at one point of an element, less its linear part.
-#[derive(Clone, Copy, Debug, Default)]
-struct PointLaw {
-    /// `ν(|B|) − ν_r` [m/H].
-    excess: f64,
-    /// `α` [m/H/T²].
-    along: f64,
-    flux_density: Complex3,
-}
-
 /// Which of the two derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Side {
@@ -61,31 +46,29 @@ enum Side {
     Adjoint,
 }
 
-impl PointLaw {
-    fn new(curve: &BhCurve, reluctivity: f64, b: Complex3) -> Self {
-        let (nu, along) = curve.amplitude(b);
-        Self { excess: nu - reluctivity, along, flux_density: b }
-    }
+/// The law at one point of an element.
+#[derive(Clone, Copy, Debug)]
+struct PointLaw {
+    law: PhasorLaw,
+    /// `ν_r` of its linear part [m/H].
+    linear: f64,
+}
 
+impl PointLaw {
     /// What a further field changes `H − ν_r B` by.
     fn derivative(&self, side: Side, of: Complex3) -> Complex3 {
         let own = match side {
-            Side::State => self.flux_density,
-            Side::Adjoint => self.flux_density.map(|b| b.conj()),
+            Side::State => self.law.derivative(of),
+            Side::Adjoint => self.law.adjoint(of),
         };
-        let along = self.along * own.iter().zip(&of).map(|(b, d)| (b.conj() * d).re).sum::<f64>();
-        std::array::from_fn(|d| self.excess * of[d] + along * own[d])
+        std::array::from_fn(|d| own[d] - self.linear * of[d])
     }
 
     /// The tensor of the preconditioner, less `ν_r`.
     fn tensor(&self) -> Tangent {
-        let b = self.flux_density;
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                let along = 0.5 * self.along * (b[i] * b[j].conj()).re;
-                along + if i == j { self.excess } else { 0.0 }
-            })
-        })
+        let mut tensor = self.law.mean();
+        (0..3).for_each(|d| tensor[d][d] -= self.linear);
+        tensor
     }
 }
 
@@ -97,7 +80,7 @@ pub(crate) struct AmplitudeTangent {
     /// Of the linear parts.
     matrix: CsrMatrix<c64>,
     /// By the elements with a law, in their order.
-    points: Vec<[PointLaw; MOST_POINTS]>,
+    points: Vec<[Option<PointLaw>; MOST_POINTS]>,
 }
 
 impl AmplitudeTangent {
@@ -107,8 +90,9 @@ impl AmplitudeTangent {
         self.matrix.mul(x, &mut y);
         // Without the prescribed part of `A`, which does not change.
         let change = FieldSolution::adjoint(x.to_vec(), LinearSolverReport { iterations: 0, residual: 0.0 });
-        let law =
-            |position: usize, point: usize, b: Complex3| self.points[position][point].derivative(side, b);
+        let law = |position: usize, point: usize, b: Complex3| {
+            self.points[position][point].map_or_else(Complex3::default, |law| law.derivative(side, b))
+        };
         add_strengths(&self.model, &self.mesh, &change, &law, &mut y);
         y
     }
@@ -135,7 +119,9 @@ impl AmplitudeTangent {
 
     /// The tensors of the complex symmetric matrix that is nearest.
     fn tensors(&self) -> Tangents {
-        let of = |points: &[PointLaw; MOST_POINTS]| points.map(|point| point.tensor());
+        let of = |points: &[Option<PointLaw>; MOST_POINTS]| {
+            points.map(|point| point.map_or_else(Tangent::default, |law| law.tensor()))
+        };
         Tangents::new(self.model.elements_with_a_law().to_vec(), self.points.iter().map(of).collect())
     }
 }
@@ -210,8 +196,8 @@ impl Problem<'_> {
         let strength = |position: usize, _: usize, b: Complex3| {
             let e = elements[position];
             let curve = self.model.curve_of(e).expect("an element with a law");
-            let excess = curve.amplitude(b).0 - self.model.coefficients_of(e).reluctivity;
-            b.map(|b| excess * b)
+            let (h, linear) = (curve.phasor(b).field_strength(), self.model.coefficients_of(e).reluctivity);
+            std::array::from_fn(|d| h[d] - linear * b[d])
         };
         let state = FieldSolution::of_state(values.clone());
         add_strengths(self.model, self.mesh, &state, &strength, &mut residual);
@@ -235,9 +221,10 @@ impl Problem<'_> {
         let state = FieldSolution::of_state(values.to_vec());
         let of_element = |&e: &_| {
             let curve = model.curve_of(e).expect("an element with a law");
-            let (mut points, mut count) = ([PointLaw::default(); MOST_POINTS], 0);
+            let (mut points, mut count) = ([None; MOST_POINTS], 0);
             let density = &mut |b| {
-                points[count] = PointLaw::new(curve, model.coefficients_of(e).reluctivity, b);
+                let linear = model.coefficients_of(e).reluctivity;
+                points[count] = Some(PointLaw { law: curve.phasor(b), linear });
                 count += 1;
                 (0.0, [c64::default(); 3])
             };
@@ -345,51 +332,5 @@ pub(crate) fn solve(
         };
         iterations += report.iterations;
         (steps, damping, iterate) = (steps + 1, length, next);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::material::VACUUM_PERMEABILITY;
-
-    fn curve() -> BhCurve {
-        let point = |i: i32| {
-            let h = 20.0 * (1.3_f64.powi(i) - 1.0);
-            [h, VACUUM_PERMEABILITY * h + 1.8 * (1.0 - (-h / 700.0).exp())]
-        };
-        BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table")
-    }
-
-    const FIELDS: [Complex3; 3] = [
-        [c64::new(0.8, 0.1), c64::new(-0.3, 0.9), c64::new(0.2, -0.7)],
-        [c64::new(1.4, -0.6), c64::new(0.5, 0.3), c64::new(-1.1, 0.2)],
-        [c64::new(1e-5, 0.0), c64::new(0.0, 1e-5), c64::new(0.0, 0.0)],
-    ];
-
-    fn strength(curve: &BhCurve, b: Complex3) -> Complex3 {
-        b.map(|c| curve.amplitude(b).0 * c)
-    }
-
-    #[test]
-    fn the_derivative_of_the_law_is_that_of_differences_and_its_adjoint_gives_the_same_work() {
-        let curve = curve();
-        let change: Complex3 = [c64::new(0.3, -0.8), c64::new(0.6, 0.2), c64::new(-0.5, 0.4)];
-        let dual: Complex3 = [c64::new(-0.2, 0.5), c64::new(0.9, -0.1), c64::new(0.3, 0.7)];
-        for b in FIELDS {
-            let law = PointLaw::new(&curve, 0.0, b);
-            let found = law.derivative(Side::State, change);
-            let moved = |s: f64| strength(&curve, std::array::from_fn(|d| b[d] + s * change[d]));
-            let (plus, minus) = (moved(1e-7), moved(-1e-7));
-            let size = found.iter().map(|c| c.norm()).fold(0.0, f64::max);
-            for d in 0..3 {
-                let difference = (plus[d] - minus[d]) / 2e-7;
-                // Truncation and rounding of central differences.
-                assert!((difference - found[d]).norm() < 1e-5 * size, "{b:?} {d}: {difference} {}", found[d]);
-            }
-            let work = |l: Complex3, h: Complex3| (0..3).map(|d| (l[d] * h[d]).re).sum::<f64>();
-            let (ahead, back) = (work(dual, found), work(law.derivative(Side::Adjoint, dual), change));
-            assert!((ahead - back).abs() < 1e-12 * ahead.abs(), "{ahead} {back}");
-        }
     }
 }

@@ -73,20 +73,18 @@ fn of_element(
     (integral, tensors)
 }
 
-/// The energy density `w(|B|)` [J/m³], with its derivatives halved; of a phasor that of its amplitude, twice the mean.
+/// The energy density [J/m³], with its derivatives halved; of a phasor twice the mean over a period.
 pub(crate) fn energy(curve: &BhCurve, b: Complex3) -> OfFlux {
-    let size = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
-    let (reluctivity, _) = curve.amplitude(b);
-    (curve.at(size).energy, b.map(|c| 0.5 * reluctivity * c.conj()))
+    let law = curve.phasor(b);
+    (law.energy(), law.field_strength().map(|h| 0.5 * h.conj()))
 }
 
 /// `H(B_u) − ν_r B_u` and `(∂H/∂B − ν_r) B_l`, from `B_l` and `B_u`: what the shape derivative takes. Of phasors the second has the
 /// derivative's adjoint, as `crate::amplitude` says.
 pub(crate) fn response(curve: &BhCurve, linear: f64, l: Complex3, u: Complex3) -> [Complex3; 2] {
-    let (reluctivity, along) = curve.amplitude(u);
-    let excess = reluctivity - linear;
-    let work = along * (0..3).map(|d| (u[d] * l[d]).re).sum::<f64>();
-    [u.map(|u| excess * u), std::array::from_fn(|d| excess * l[d] + work * u[d].conj())]
+    let law = curve.phasor(u);
+    let less = |h: Complex3, b: Complex3| std::array::from_fn(|d| h[d] - linear * b[d]);
+    [less(law.field_strength(), u), less(law.adjoint(l), l)]
 }
 
 fn less(mut tensor: Tangent, reluctivity: f64) -> Tangent {

@@ -3,7 +3,7 @@
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{ElementId, Mesh};
 
-use crate::bh::BhCurve;
+use crate::bh::{BhCurve, peak};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 
@@ -12,7 +12,7 @@ use crate::solution::FieldSolution;
 pub struct Saturation {
     /// Its name.
     pub region: String,
-    /// The largest mean `|B|` of an element [T].
+    /// The largest `|B|` of an element's mean field [T], in harmonics at its peak.
     pub highest: f64,
     /// Where [m].
     pub place: Point,
@@ -31,7 +31,7 @@ pub fn by_region(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> V
     let mut found: Vec<Option<(Saturation, [f64; 2])>> = vec![None; topology.region_names().len()];
     let sizes = solution.flux_densities_of(model, mesh, elements);
     for (&e, b) in elements.iter().zip(sizes) {
-        let size = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+        let size = peak(b);
         let region = topology.region_of()[e.index()].index();
         let (saturation, volumes) = found[region]
             .get_or_insert_with(|| (of_region(model, &topology.region_names()[region], e), [0.0; 2]));

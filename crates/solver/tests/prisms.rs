@@ -8,6 +8,7 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, RegionId};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
@@ -110,19 +111,22 @@ fn the_weak_field_beside_iron_needs_quadratic_or_edge_elements() {
     let mesh = square();
     let iron = Material { relative_permeability: 1e3, conductivity: 0.0 };
     let exact = c64::from(-MOMENT * VACUUM_PERMEABILITY / (3.0 + 1e3));
-    // docs/theory.md, section 2.5: linear elements have four times the field with p = 1, and a smaller p is no cure.
+    let line = |from: f64, by: f64| (0..3).map(move |i| from + by * f64::from(i));
+    let of = |x: f64| line(-0.8, 0.1).flat_map(move |y| line(0.0, 0.025).map(move |z| [x, y, z]));
+    let far: Vec<Point> = line(-0.8, 0.12).flat_map(of).collect();
+    // docs/theory.md, section 2.5: linear elements have four times the field with p = 1, and a smaller p is no cure; the worst of 27 places.
     for (family, order, penalty, tolerance) in [
-        (ElementFamily::Nodal, Order::Linear, 0.1, 0.9),
-        (ElementFamily::Nodal, Order::Quadratic, 1.0, 0.001),
-        (ElementFamily::Nodal, Order::Quadratic, 0.1, 0.01),
-        (ElementFamily::Nodal, Order::Quadratic, 0.01, 0.05),
+        (ElementFamily::Nodal, Order::Linear, 0.1, 1.7),
+        (ElementFamily::Nodal, Order::Quadratic, 1.0, 0.03),
+        (ElementFamily::Nodal, Order::Quadratic, 0.1, 0.02),
+        (ElementFamily::Nodal, Order::Quadratic, 0.01, 0.1),
         (ElementFamily::Edge, Order::Linear, 1.0, 1e-9),
     ] {
         let materials = vec![Material::AIR, iron, Material::AIR];
         let setup = FieldModelSetup { penalty, materials, ..in_the_square((family, order), 0.0) };
         let (model, solution) = solved(&mesh, setup);
-        let b = probe(&solution, &model, &mesh, "far", &[[-0.6, -0.6, 0.05]]).expect("a point of the mesh");
-        let error = (b[0][2] / exact - 1.0).norm();
+        let b = probe(&solution, &model, &mesh, "far", &far).expect("points of the mesh");
+        let error = b.iter().map(|b| (b[2] / exact - 1.0).norm()).fold(0.0, f64::max);
         println!("{family:?}, {order:?}, penalty {penalty}: {error:.2e}");
         assert!(error < tolerance, "{family:?}, {order:?}, penalty {penalty}: {error:.2e}");
     }

@@ -138,8 +138,8 @@ choice! {
         /// Eddy-current loss of a conductor, time average [W]; needs a frequency above 0. The conductor is meshed or replaced by its
         /// impedance surface, and may move.
         Loss = "loss",
-        /// Energy of the magnetic field [J]: ½ ∫ ν |B|² dV in statics, its time average ¼ ∫ ν |B|² dV in harmonics. The region
-        /// is meshed and may move.
+        /// Energy of the magnetic field [J]: ½ ∫ ν |B|² dV in statics, of a magnet ½ ∫ ν |B − Br|² dV, along a B–H curve the
+        /// integral of H over B; in harmonics its time average, ¼ ∫ ν |B|² dV. The region is meshed and may move.
         Energy = "energy",
         /// Force on a body of `[[forces]]` along `direction` [N], of the meshed part; in harmonics its time average. The body may
         /// move.

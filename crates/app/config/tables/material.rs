@@ -15,8 +15,9 @@ table! {
     /// An isotropic material: linear, or with a B–H curve. Any number of them, each with a name of its own. A list or table in
     /// place of a number, an anisotropic material, is refused.
     ///
-    /// A curve holds for static fields, and above 0 Hz for amplitudes: the field strength of the curve at the peak of the flux
-    /// density, of which the fundamental alone is computed. That is an approximation.
+    /// A curve holds for static fields, and above 0 Hz where the flux density is largest and least in a period, of which the
+    /// fundamental alone is computed: at the peak of a field in one direction, all the time in one that turns. That is an
+    /// approximation.
     ///
     /// ```toml
     /// [materials.steel]

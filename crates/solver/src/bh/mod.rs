@@ -2,14 +2,17 @@
 //!
 //! `H = h(|B|) B/|B|` with `h` increasing, so that the energy density `w(b) = ∫₀ᵇ h` is convex in `B` and its tangent
 //! `∂H/∂B = h/b I + (h' − h/b) B Bᵀ/b²` positive definite. Here: what laws have in common. A `table` of points is one, two closed
-//! forms (`analytic`) are others.
+//! forms (`analytic`) are others; what becomes of them in a field that alternates is in `phasor`.
 
 mod analytic;
+mod phasor;
 mod table;
 
 use fluxmorph_geometry::tet4::{Point, dot};
 
 pub use analytic::{Analytic, Knee};
+pub(crate) use phasor::PhasorLaw;
+pub use phasor::peak;
 pub use table::BhFault;
 use table::Table;
 
@@ -86,13 +89,10 @@ impl BhCurve {
         })
     }
 
-    /// `ν = h/|B|` [m/H] and `α = (h' − ν)/|B|²` [m/H/T²] of the amplitude of a phasor, `|B|² = Bᴴ B`.
+    /// The law at a phasor [T].
     #[inline]
-    pub fn amplitude(&self, b: Complex3) -> (f64, f64) {
-        let size = b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
-        let at = self.at(size);
-        let reluctivity = self.reluctivity(size, at);
-        (reluctivity, if size > 0.0 { (at.slope - reluctivity) / (size * size) } else { 0.0 })
+    pub(crate) fn phasor(&self, b: Complex3) -> PhasorLaw {
+        PhasorLaw::new(self, b)
     }
 
     /// `h/b`; at zero its limit.

@@ -8,7 +8,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fluxmorph_geometry::tet4::{Point, cross, sub};
+use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
@@ -61,8 +61,8 @@ pub fn resultant(nodal: &BTreeMap<NodeId, Point>, mesh: &Mesh, about: Point) -> 
 pub struct Force {
     /// Elements that touch the body from outside, ascending.
     layer: Vec<ElementId>,
-    /// Nodes of the body, with bits of the axes along which they cannot move: across a conditioned plane.
-    body: BTreeMap<NodeId, u8>,
+    /// Nodes of the body, with the directions in which they cannot move, across conditioned surfaces: orthonormal.
+    body: BTreeMap<NodeId, Vec<Point>>,
     motion: RigidMotion,
 }
 
@@ -82,9 +82,9 @@ impl Force {
         let region_of = |e: ElementId| topology.region_of()[e.index()];
         let inside = |e: &ElementId| regions.contains(&region_of(*e));
         let of_body = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
-        let mut body: BTreeMap<NodeId, u8> = of_body.map(|node| (node, 0)).collect();
-        for (node, axes) in model.unknowns().plane_nodes() {
-            body.entry(node).and_modify(|held| *held |= axes);
+        let mut body: BTreeMap<NodeId, Vec<Point>> = of_body.map(|node| (node, Vec::new())).collect();
+        for (node, normal) in conditioned(model) {
+            body.entry(node).and_modify(|held| hold(held, normal));
         }
         let around = body.keys().flat_map(|&node| topology.elements_around(node)).copied();
         let layer: BTreeSet<ElementId> = around.filter(|e| !inside(e)).collect();
@@ -137,7 +137,8 @@ impl Force {
             for (node, term) in topology.tet(e).into_iter().zip(terms) {
                 let Some(held) = self.body.get(&node) else { continue };
                 let sum: &mut Point = sums.entry(node).or_default();
-                (0..3).filter(|d| held >> d & 1 == 0).for_each(|d| sum[d] -= term[d]);
+                let free = without(held, *term);
+                (0..3).for_each(|d| sum[d] -= free[d]);
             }
         }
         sums
@@ -156,10 +157,8 @@ impl Force {
         solution: &FieldSolution,
     ) -> FunctionalValue {
         let space = model.space();
-        let free = |node: NodeId, vector: Point| -> Point {
-            let held = self.body.get(&node).copied().unwrap_or(0b111);
-            std::array::from_fn(|d| if held >> d & 1 == 1 { 0.0 } else { vector[d] })
-        };
+        let free =
+            |node: NodeId, vector: Point| self.body.get(&node).map_or([0.0; 3], |held| without(held, vector));
         let mut sum = Sum::new(model);
         sum.elements(&self.layer, |e| {
             let nodes = model.topology().tet(e);
@@ -180,6 +179,36 @@ impl Force {
         });
         sum.into_value()
     }
+}
+
+/// The nodes on conditioned surfaces with the normals of these, a node once for each.
+fn conditioned(model: &FieldModel) -> impl Iterator<Item = (NodeId, Point)> + '_ {
+    let unknowns = model.unknowns();
+    let of_planes = unknowns.plane_nodes().flat_map(|(node, axes)| {
+        let across = (0..3).filter(move |axis| axes >> axis & 1 == 1);
+        across.map(move |axis| (node, std::array::from_fn(|d| f64::from(u8::from(d == axis)))))
+    });
+    of_planes.chain(unknowns.oblique_nodes().iter().copied())
+}
+
+/// What a normal must have beside directions that are held [1] to be another one, and not of a face of the same surface.
+const INDEPENDENT: f64 = 1e-2;
+
+/// Adds to some directions what a normal has beside them.
+fn hold(held: &mut Vec<Point>, normal: Point) {
+    let rest = without(held, normal);
+    let length = norm(rest);
+    if length > INDEPENDENT {
+        held.push(rest.map(|c| c / length));
+    }
+}
+
+/// What a vector has beside some directions.
+fn without(held: &[Point], vector: Point) -> Point {
+    held.iter().fold(vector, |rest, direction| {
+        let along = dot(rest, *direction);
+        std::array::from_fn(|d| rest[d] - along * direction[d])
+    })
 }
 
 /// Whether the current of a coil flows in an element.

@@ -13,6 +13,7 @@ use crate::error::SolverError;
 use crate::linear::{FieldKind, SystemAnalysis, SystemPattern};
 use crate::load::Sources;
 use crate::load_case::LoadCase;
+use crate::recovery::Walls;
 use crate::setup::{self, FieldModelSetup};
 use crate::weak_form::WeakForm;
 
@@ -60,7 +61,8 @@ impl FieldModel {
         if let Some(shell) = weak_form.shell() {
             setup::check_open(shell, mesh, &setup, sources.coil_elements())?;
         }
-        let shared = Arc::new(SharedParts { fine, solids, analysis: analysis.map(Arc::new) });
+        let walls = Walls::new(mesh.topology(), &setup.boundaries)?;
+        let shared = Arc::new(SharedParts { fine, solids, walls, analysis: analysis.map(Arc::new) });
         let (setup, weak_form) = (Arc::new(setup), Arc::new(weak_form));
         let (sources, windings) = (Arc::new(sources), Arc::new(windings));
         let model =

@@ -24,6 +24,7 @@ use crate::linear::{FieldSystem, LinearSolverCache, LocalSystem, PreparedSystem,
 use crate::load::Sources;
 use crate::material::Material;
 use crate::open::Shell;
+use crate::recovery::Walls;
 use crate::setup::FieldModelSetup;
 use crate::space::Space;
 use crate::surface::{Conductor, SurfaceTerm};
@@ -51,6 +52,7 @@ pub struct FieldModel {
 struct SharedParts {
     fine: Discretisation,
     solids: Solids,
+    walls: Walls,
     /// Of one process.
     analysis: Option<Arc<SystemAnalysis>>,
 }
@@ -317,6 +319,10 @@ impl FieldModel {
 
     pub(crate) fn surface(&self) -> impl Iterator<Item = ([NodeId; 3], SurfaceTerm)> + '_ {
         self.weak_form.surface()
+    }
+
+    pub(crate) fn walls(&self) -> &Walls {
+        &self.shared.walls
     }
 
     pub(crate) fn sources(&self) -> &Sources {

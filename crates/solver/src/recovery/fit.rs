@@ -1,5 +1,7 @@
 //! A polynomial fitted to values at points, as weights of these values.
 
+use std::ops::{Div, Mul, Sub};
+
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
 
@@ -22,8 +24,8 @@ const DEPENDENT: f64 = 1e-3;
 
 /// The polynomial of a degree fitted to values at points, at the origin.
 ///
-/// The least-squares problem is solved by orthogonal factorisation of its matrix (modified Gram–Schmidt), coordinates
-/// scaled to the extent of the points in each direction.
+/// The least-squares problem is solved by orthogonal factorisation of its matrix (modified Gram–Schmidt), in coordinates
+/// that scale with the points: what is fitted follows from where they lie to each other, whatever the axes.
 pub(super) struct Fit {
     monomials: Vec<[i32; 3]>,
     /// The points in the scaled coordinates.
@@ -34,15 +36,64 @@ pub(super) struct Fit {
     upper: Vec<Vec<f64>>,
     /// Weight of every point.
     weights: Vec<f64>,
-    /// Extent of the points.
-    scale: Point,
+    frame: Frame,
+}
+
+/// Coordinates `ξ = L⁻¹p` in which the second moments of some points about the origin, `Σ p pᵀ/n = LLᵀ`, are those of unit axes: an
+/// affine map of all points leaves `|ξ|` of each as it was.
+struct Frame {
+    /// `L`, a lower triangle [m].
+    lower: [Point; 3],
+}
+
+/// The part of a moment that other axes do not already contain, relative to it, below which the points lie in a plane.
+const FLAT: f64 = 1e-12;
+
+impl Frame {
+    const UNIT: Self = Self { lower: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
+
+    /// Of points that do not all lie in a plane with the origin.
+    fn of(points: &[Point]) -> Option<Self> {
+        let moment =
+            |i: usize, j: usize| points.iter().map(|p| p[i] * p[j]).sum::<f64>() / points.len() as f64;
+        let mut lower = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..=i {
+                let open = moment(i, j) - (0..j).map(|k| lower[i][k] * lower[j][k]).sum::<f64>();
+                lower[i][j] = if i == j { open.max(0.0).sqrt() } else { open / lower[j][j] };
+            }
+            let square = lower[i][i] * lower[i][i];
+            if square.is_nan() || square <= FLAT * moment(i, i) {
+                return None;
+            }
+        }
+        Some(Self { lower })
+    }
+
+    fn coordinates(&self, p: &Point) -> Point {
+        let l = &self.lower;
+        let x = p[0] / l[0][0];
+        let y = (p[1] - l[1][0] * x) / l[1][1];
+        [x, y, (p[2] - l[2][0] * x - l[2][1] * y) / l[2][2]]
+    }
+
+    /// A gradient by the place [1/m], of one by these coordinates: `L⁻ᵀg`.
+    fn gradient<T>(&self, g: [T; 3]) -> [T; 3]
+    where
+        T: Copy + Sub<Output = T> + Mul<f64, Output = T> + Div<f64, Output = T>,
+    {
+        let l = &self.lower;
+        let z = g[2] / l[2][2];
+        let y = (g[1] - z * l[2][1]) / l[1][1];
+        [(g[0] - y * l[1][0] - z * l[2][0]) / l[0][0], y, z]
+    }
 }
 
 impl Fit {
-    /// With the weight `exp(−|ξ|²)` in the scaled coordinates, that lets the nearest points count most; `None` where the points do
-    /// not determine the polynomial.
+    /// With the weight `exp(−|ξ|²/2)` in the scaled coordinates, in which 3 is the mean of `|ξ|²`, that lets the nearest points count most;
+    /// `None` where the points do not determine the polynomial.
     pub(super) fn new(degree: usize, points: &[Point]) -> Option<Self> {
-        Self::weighted(degree, points, |square| (-square).exp())
+        Self::weighted(degree, points, |square| (-0.5 * square).exp())
     }
 
     /// All points count alike: a smooth function of their places, whatever the scale. `None` as above.
@@ -56,12 +107,10 @@ impl Fit {
         if points.len() < terms {
             return None;
         }
-        let scale: Point = std::array::from_fn(|d| points.iter().map(|p| p[d].abs()).fold(0.0, f64::max));
+        let frame = if degree == 0 { Frame::UNIT } else { Frame::of(points)? };
         let mut columns = vec![Vec::with_capacity(points.len()); terms];
         let mut weights = Vec::with_capacity(points.len());
-        // A single monomial does not need an extent.
-        let scaled = |p: &Point| std::array::from_fn(|d| if scale[d] > 0.0 { p[d] / scale[d] } else { 0.0 });
-        let scaled: Vec<Point> = points.iter().map(scaled).collect();
+        let scaled: Vec<Point> = points.iter().map(|p| frame.coordinates(p)).collect();
         for &[x, y, z] in &scaled {
             let weight = weight(x * x + y * y + z * z);
             for (column, &[i, j, k]) in columns.iter_mut().zip(&monomials) {
@@ -90,7 +139,7 @@ impl Fit {
                 *c /= length;
             }
         }
-        Some(Self { monomials, points: scaled, columns, upper, weights, scale })
+        Some(Self { monomials, points: scaled, columns, upper, weights, frame })
     }
 
     /// Weights of the values in the polynomial's value.
@@ -101,8 +150,7 @@ impl Fit {
     /// Weights of the values in its gradient [1/m].
     pub(super) fn gradient(&self) -> Vec<Point> {
         let [x, y, z] = [1, 2, 3].map(|k| self.coefficient(k));
-        let [a, b, c] = self.scale;
-        x.iter().zip(&y).zip(&z).map(|((x, y), z)| [x / a, y / b, z / c]).collect()
+        x.iter().zip(&y).zip(&z).map(|((x, y), z)| self.frame.gradient([*x, *y, *z])).collect()
     }
 
     /// Derivatives of the value of an even fit by the places of its points [unit of the values per m], the values held.
@@ -118,15 +166,16 @@ impl Fit {
         let at = |(p, (&w, v)): (&Point, (&f64, &c64))| -> [c64; 3] {
             let value = |[i, j, k]: [i32; 3]| p[0].powi(i) * p[1].powi(j) * p[2].powi(k);
             let fitted: c64 = (0..terms).map(|t| value(self.monomials[t]) * coefficients[t]).sum();
-            std::array::from_fn(|d| {
+            let change = std::array::from_fn(|d| {
                 let slope = |mut exponents: [i32; 3]| {
                     let power = exponents[d];
                     exponents[d] = (power - 1).max(0);
-                    if power == 0 { 0.0 } else { f64::from(power) * value(exponents) / self.scale[d] }
+                    if power == 0 { 0.0 } else { f64::from(power) * value(exponents) }
                 };
                 let along = |of: &[c64]| (0..terms).map(|t| slope(self.monomials[t]) * of[t]).sum::<c64>();
                 along(&dual) * (v - fitted) - w * along(&coefficients)
-            })
+            });
+            self.frame.gradient(change)
         };
         self.points.iter().zip(weights.iter().zip(values)).map(at).collect()
     }
@@ -187,6 +236,29 @@ mod tests {
         }
         let value: f64 = fit.value().iter().zip(&points).map(|(w, &p)| w * quadratic(p)).sum();
         assert!((value - 0.4).abs() < 1e-13, "{value}");
+    }
+
+    #[test]
+    fn what_is_fitted_does_not_depend_on_the_axes() {
+        let points: Vec<Point> =
+            grid([4, 3, 4]).into_iter().map(|[x, y, z]| [x + 0.003, y - 0.2, z + 0.1 * x * x]).collect();
+        let rough = |k: usize| (7.3 * k as f64).sin();
+        let slope = |points: &[Point], along: Point| -> f64 {
+            let gradients = Fit::new(2, points).expect("48 points determine a quadratic").gradient();
+            let along = |g: &Point| (0..3).map(|d| g[d] * along[d]).sum::<f64>();
+            gradients.iter().enumerate().map(|(k, g)| rough(k) * along(g)).sum()
+        };
+        // Turned by 30 degrees about z, then sheared: a layer a thousand times as wide as thick that leans.
+        let turned = |[x, y, z]: Point| {
+            let (x, y) = (0.75f64.sqrt() * x - 0.5 * y, 0.5 * x + 0.75f64.sqrt() * y);
+            [x, y + 0.3 * x, z + 0.8 * x - y]
+        };
+        let moved: Vec<Point> = points.iter().map(|&p| turned(p)).collect();
+        for along in [[1e-2, 0.0, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 1e-4]] {
+            let (before, after) = (slope(&points, along), slope(&moved, turned(along)));
+            // Coordinates cancel to 1e-4 of themselves, squared in the moments: rounding of 1e-16 / 1e-8, a hundredfold.
+            assert!((before - after).abs() < 1e-6 * before.abs(), "{along:?}: {before} {after}");
+        }
     }
 
     #[test]

@@ -8,20 +8,23 @@
 //! the true field jumps, and at the face of a winding its slope does, so only elements of the probed element's material and coil
 //! take part.
 //!
+//! At a symmetry plane the patch goes on with its images ([`mirror`]), so that part of a device has the values of the whole.
+//!
 //! A recovered value is linear in the field: [`RecoveredPoint`] holds its weights, for values and for derivatives.
 //!
 //! Edge elements have no potentials at nodes, and their gauge leaves `A` rough: there a polynomial is fitted to `B` itself at
 //! the points of elements where it is best (Zienkiewicz and Zhu, Int. J. Numer. Methods Eng. 33 (1992) 1331).
 
 mod fit;
+mod mirror;
 mod places;
 
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::locate;
-use fluxmorph_geometry::tet4::{Point, sub};
-use fluxmorph_geometry::{CarrierId, ElementId, Mesh, Topology};
+use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 use rayon::prelude::*;
 
 use crate::element::Complex3;
@@ -32,6 +35,8 @@ use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 use fit::Fit;
+pub(crate) use mirror::Walls;
+use mirror::{Image, Mirrors};
 pub(crate) use places::{BlendedField, FixedPlaces};
 
 /// Layers of elements around the probed one after which no fit is tried.
@@ -41,15 +46,16 @@ const LAYERS_LIMIT: usize = 3;
 ///
 /// `A` at the nodes of all elements that share a vertex with `element` and have its material, fitted by least squares with a
 /// polynomial of one degree more than that of the elements; of edge elements `B` in them, with one of their degree. A further
-/// layer of elements where these do not determine it.
+/// layer of elements where these do not determine it; with their images where they lie at a symmetry plane.
 /// In a part of the material too small for any fit, the element's own mean.
 #[derive(Clone, Debug)]
 pub struct RecoveredPoint {
     elements: BTreeSet<ElementId>,
-    weights: Weights,
+    /// `B = Σ T B_i` over the elements themselves and their images.
+    images: Vec<([Point; 3], Weights)>,
 }
 
-/// What a recovered value adds up.
+/// What a recovered value adds up of the elements themselves, or of one image.
 #[derive(Clone, Debug)]
 enum Weights {
     /// `B = Σ g × A` over nodes with `g` [1/m].
@@ -62,19 +68,27 @@ impl RecoveredPoint {
     /// At a point of an element.
     pub fn new(model: &FieldModel, mesh: &Mesh, element: ElementId, point: Point) -> Self {
         let is_alike = has_the_material_of(model, element);
-        let mut elements = BTreeSet::from([element]);
-        for _ in 0..LAYERS_LIMIT {
-            elements = around(model.topology(), &elements, &is_alike);
-            let weights = match model.space().family() {
-                ElementFamily::Nodal => of_potentials(model, mesh, &elements, point),
-                ElementFamily::Edge => of_flux_densities(model, mesh, &elements, point),
+        let mut mirrors = Mirrors::new(model, element);
+        let mut members = BTreeSet::from([(0, element)]);
+        let mut layers = 0;
+        while layers < LAYERS_LIMIT {
+            members = mirrors.around((model, mesh), &members, &is_alike);
+            layers += 1;
+            if mirrors.give_up_crossed(mesh, &members) {
+                (members, layers) = (BTreeSet::from([(0, element)]), 0);
+                continue;
+            }
+            let patch = (&members, &mirrors);
+            let images = match model.space().family() {
+                ElementFamily::Nodal => of_potentials(model, mesh, patch, (element, point)),
+                ElementFamily::Edge => of_flux_densities(model, mesh, patch, point),
             };
-            if let Some(weights) = weights {
-                return Self { elements, weights };
+            if let Some(images) = images {
+                return Self { elements: members.into_iter().map(|(_, e)| e).collect(), images };
             }
         }
         let own = Weights::FluxDensities(vec![(element, [0.25; 4], 1.0)]);
-        Self { elements: BTreeSet::from([element]), weights: own }
+        Self { elements: BTreeSet::from([element]), images: vec![(mirrors.turn(0), own)] }
     }
 
     /// The elements that take part, ascending.
@@ -85,21 +99,9 @@ impl RecoveredPoint {
     /// `B` [T] there.
     pub fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
         let mut sum = [c64::default(); 3];
-        match &self.weights {
-            Weights::Potentials(nodes) => {
-                for (node, g) in nodes {
-                    let [a, b, c, _] = solution.potentials(model, *node);
-                    sum[0] += g[1] * c - g[2] * b;
-                    sum[1] += g[2] * a - g[0] * c;
-                    sum[2] += g[0] * b - g[1] * a;
-                }
-            }
-            Weights::FluxDensities(points) => {
-                for (e, lambda, weight) in points {
-                    let b = solution.at(model, mesh, *e, lambda).flux_density;
-                    (0..3).for_each(|d| sum[d] += *weight * b[d]);
-                }
-            }
+        for (turn, weights) in &self.images {
+            let part = turned(turn, weights.flux_density(solution, model, mesh));
+            (0..3).for_each(|d| sum[d] += part[d]);
         }
         sum
     }
@@ -112,8 +114,42 @@ impl RecoveredPoint {
         mesh: &Mesh,
         derivative: &mut [c64],
     ) {
-        match &self.weights {
-            Weights::Potentials(nodes) => {
+        for (turn, weights) in &self.images {
+            weights.add_derivative(turned(turn, q), model, mesh, derivative);
+        }
+    }
+}
+
+/// `Tv` of a symmetric matrix.
+fn turned(t: &[Point; 3], v: Complex3) -> Complex3 {
+    t.map(|row| (0..3).map(|d| row[d] * v[d]).sum())
+}
+
+impl Weights {
+    fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+        let mut sum = [c64::default(); 3];
+        match self {
+            Self::Potentials(nodes) => {
+                for (node, g) in nodes {
+                    let [a, b, c, _] = solution.potentials(model, *node);
+                    sum[0] += g[1] * c - g[2] * b;
+                    sum[1] += g[2] * a - g[0] * c;
+                    sum[2] += g[0] * b - g[1] * a;
+                }
+            }
+            Self::FluxDensities(points) => {
+                for (e, lambda, weight) in points {
+                    let b = solution.at(model, mesh, *e, lambda).flux_density;
+                    (0..3).for_each(|d| sum[d] += *weight * b[d]);
+                }
+            }
+        }
+        sum
+    }
+
+    fn add_derivative(&self, q: Complex3, model: &FieldModel, mesh: &Mesh, derivative: &mut [c64]) {
+        match self {
+            Self::Potentials(nodes) => {
                 for (node, g) in nodes {
                     // q·(g × A) = (q × g)·A.
                     let components = [
@@ -125,7 +161,7 @@ impl RecoveredPoint {
                     model.unknowns().scatter_add(derivative, *node, components);
                 }
             }
-            Weights::FluxDensities(points) => {
+            Self::FluxDensities(points) => {
                 for (e, lambda, weight) in points {
                     scatter_flux((model, mesh), (*e, lambda), q.map(|c| *weight * c), derivative);
                 }
@@ -147,17 +183,6 @@ fn has_the_material_of(model: &FieldModel, element: ElementId) -> impl Fn(Elemen
     move |e| material(e) == own
 }
 
-/// Some elements with all that share a vertex with one of them, those that count.
-fn around(
-    topology: &Topology,
-    elements: &BTreeSet<ElementId>,
-    counts: &impl Fn(ElementId) -> bool,
-) -> BTreeSet<ElementId> {
-    let vertices = elements.iter().flat_map(|&e| topology.tet(e));
-    let all = vertices.flat_map(|n| topology.elements_around(n)).copied();
-    all.filter(|&e| counts(e)).collect()
-}
-
 /// Points of an element of an order at which `B` is of one order better: the centroid, or the four of the rule of degree 2.
 fn superconvergent(order: Order) -> &'static [Node] {
     match order {
@@ -166,13 +191,14 @@ fn superconvergent(order: Order) -> &'static [Node] {
     }
 }
 
-/// The superconvergent points of some elements.
+/// The superconvergent points of some elements and images.
 fn samples_in<'e>(
     order: Order,
-    elements: impl IntoIterator<Item = &'e ElementId>,
-) -> Vec<(ElementId, &'static [f64; 4])> {
+    members: impl IntoIterator<Item = &'e (Image, ElementId)>,
+) -> Vec<(Image, ElementId, &'static [f64; 4])> {
     let rule = superconvergent(order);
-    elements.into_iter().flat_map(|&e| rule.iter().map(move |(lambda, _)| (e, lambda))).collect()
+    let of_member = |&(image, e)| rule.iter().map(move |(lambda, _)| (image, e, lambda));
+    members.into_iter().flat_map(of_member).collect()
 }
 
 /// Adds `∂(q·B)/∂u` at a point of an element to a vector of unknowns.
@@ -201,34 +227,58 @@ pub fn recovered_flux_density(
     RecoveredPoint::new(model, mesh, element, point).flux_density(solution, model, mesh)
 }
 
-/// The curl at a point of the polynomial fitted to the potentials at the nodes of some elements.
+/// The curl at a point of an element of the polynomial fitted to the potentials at the nodes of a patch.
+///
+/// Of an image with the places `Qx` the potential is `det(Q) TA`, and `g × det(Q) TA = T(Qg × A)`.
 fn of_potentials(
     model: &FieldModel,
     mesh: &Mesh,
-    elements: &BTreeSet<ElementId>,
-    point: Point,
-) -> Option<Weights> {
+    (members, mirrors): (&BTreeSet<(Image, ElementId)>, &Mirrors),
+    (element, point): (ElementId, Point),
+) -> Option<Vec<([Point; 3], Weights)>> {
     let space = model.space();
-    let nodes: BTreeSet<CarrierId> = elements.iter().flat_map(|&e| space.carriers_of(e)).copied().collect();
-    let offsets: Vec<Point> = nodes.iter().map(|&n| sub(space.position(mesh, n), point)).collect();
+    let reach = mesh.vertices(element).map(|x| norm(sub(x, point))).into_iter().fold(0.0, f64::max);
+    let of_member = |&(image, e): &(Image, ElementId)| {
+        let distinct = move |&n| (mirrors.distinct(image, space.position(mesh, n), reach), n);
+        space.carriers_of(e).iter().map(distinct)
+    };
+    let nodes: BTreeSet<(Image, CarrierId)> = members.iter().flat_map(of_member).collect();
+    let offset = |&(image, n)| sub(mirrors.place(image, space.position(mesh, n)), point);
+    let offsets: Vec<Point> = nodes.iter().map(offset).collect();
     let gradients = Fit::new(space.order().degree() + 1, &offsets)?.gradient();
-    Some(Weights::Potentials(nodes.into_iter().zip(gradients).collect()))
+    let weights = nodes.into_iter().zip(gradients);
+    let weights = weights.map(|((image, n), g)| (image, (n, mirrors.direction(image, g))));
+    Some(by_image(mirrors, weights, Weights::Potentials))
 }
 
-/// The value at a point of the polynomial fitted to the flux densities in some elements, taken where they are of one order
-/// better.
+/// The value at a point of the polynomial fitted to the flux densities in a patch, taken where they are of one order better.
 fn of_flux_densities(
     model: &FieldModel,
     mesh: &Mesh,
-    elements: &BTreeSet<ElementId>,
+    (members, mirrors): (&BTreeSet<(Image, ElementId)>, &Mirrors),
     point: Point,
-) -> Option<Weights> {
+) -> Option<Vec<([Point; 3], Weights)>> {
     let order = model.space().order();
-    let samples = samples_in(order, elements);
-    let weights = Fit::new(order.degree(), &places::offsets(mesh, &samples, point))?.value();
-    Some(Weights::FluxDensities(
-        samples.into_iter().zip(weights).map(|((e, lambda), w)| (e, *lambda, w)).collect(),
-    ))
+    let samples = samples_in(order, members);
+    let weights = Fit::new(order.degree(), &places::offsets(mesh, mirrors, &samples, point))?.value();
+    let weights = samples.into_iter().zip(weights).map(|((image, e, lambda), w)| (image, (e, *lambda, w)));
+    Some(by_image(mirrors, weights, Weights::FluxDensities))
+}
+
+/// Weights that ascend by image, for each of them.
+fn by_image<W>(
+    mirrors: &Mirrors,
+    weights: impl Iterator<Item = (Image, W)>,
+    of: impl Fn(Vec<W>) -> Weights,
+) -> Vec<([Point; 3], Weights)> {
+    let mut images: Vec<(Image, Vec<W>)> = Vec::new();
+    for (image, weight) in weights {
+        match images.last_mut() {
+            Some((last, weights)) if *last == image => weights.push(weight),
+            _ => images.push((image, vec![weight])),
+        }
+    }
+    images.into_iter().map(|(image, weights)| (mirrors.turn(image), of(weights))).collect()
 }
 
 /// The recovered flux density [T] at the points of a probe.

@@ -16,7 +16,8 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use rayon::prelude::*;
 
 use super::fit::Fit;
-use super::{LAYERS_LIMIT, around, has_the_material_of, samples_in, scatter_flux, superconvergent};
+use super::mirror::{Image, Mirrors};
+use super::{LAYERS_LIMIT, has_the_material_of, samples_in, scatter_flux, superconvergent, turned};
 use crate::element::quadrature::Node;
 use crate::element::{Complex3, dot3};
 use crate::error::SolverError;
@@ -58,7 +59,9 @@ struct BlendedPoint {
 
 /// A polynomial fitted around a vertex to the samples in some elements.
 struct Patch {
-    elements: Vec<ElementId>,
+    /// With their images.
+    members: Vec<(Image, ElementId)>,
+    mirrors: Mirrors,
     fit: Fit,
     /// Of the samples in its value at the place.
     weights: Vec<f64>,
@@ -102,7 +105,8 @@ impl FixedPlaces {
         };
         let points: Vec<BlendedPoint> = located.par_iter().zip(&self.places).map(blend).collect();
         let patches = points.iter().flat_map(|point| &point.patches);
-        let mut elements: Vec<ElementId> = patches.flat_map(|patch| patch.elements.iter().copied()).collect();
+        let mut elements: Vec<ElementId> =
+            patches.flat_map(|patch| patch.members.iter().map(|(_, e)| *e)).collect();
         elements.sort_unstable();
         elements.dedup();
         let rule = superconvergent(model.space().order());
@@ -141,32 +145,47 @@ impl FixedPlaces {
         (element, vertex): (ElementId, NodeId),
         point: Point,
     ) -> Patch {
-        let (topology, order) = (model.topology(), model.space().order());
+        let order = model.space().order();
         let is_alike = has_the_material_of(model, element);
-        let of_vertex = topology.elements_around(vertex).iter().copied();
-        let mut elements: BTreeSet<ElementId> = of_vertex.filter(|&e| is_alike(e)).collect();
-        let fitted = |elements: &BTreeSet<ElementId>, degree| {
-            let elements: Vec<ElementId> = elements.iter().copied().collect();
-            let samples = samples_in(order, &elements);
-            Fit::even(degree, &offsets(&self.start, &samples, self.start.point(vertex)))?;
-            let fit = Fit::even(degree, &offsets(mesh, &samples, point))?;
-            Some(Patch { elements, weights: fit.value(), fit })
+        let start = (model, &self.start);
+        let mut mirrors = Mirrors::new(model, element);
+        let mut members = mirrors.around_node(start, vertex, &is_alike);
+        let fitted = |members: &BTreeSet<(Image, ElementId)>, mirrors: &Mirrors, degree| {
+            let samples = samples_in(order, members);
+            Fit::even(degree, &offsets(&self.start, mirrors, &samples, self.start.point(vertex)))?;
+            let fit = Fit::even(degree, &offsets(mesh, mirrors, &samples, point))?;
+            let (members, mirrors) = (members.iter().copied().collect(), mirrors.clone());
+            Some(Patch { members, mirrors, weights: fit.value(), fit })
         };
-        for _ in 0..LAYERS_LIMIT {
-            if let Some(patch) = fitted(&elements, order.degree()) {
+        let mut layers = 0;
+        while layers < LAYERS_LIMIT {
+            if mirrors.give_up_crossed(&self.start, &members) {
+                (members, layers) = (mirrors.around_node(start, vertex, &is_alike), 0);
+                continue;
+            }
+            if let Some(patch) = fitted(&members, &mirrors, order.degree()) {
                 return patch;
             }
-            elements = around(topology, &elements, &is_alike);
+            members = mirrors.around(start, &members, &is_alike);
+            layers += 1;
         }
         // In a part too small for any fit, the mean of its own.
-        let mean = fitted(&BTreeSet::from([element]), 0);
+        let mean = fitted(&BTreeSet::from([(0, element)]), &mirrors, 0);
         mean.expect("one value determines a constant")
     }
 }
 
 /// Where samples lie [m], from a point.
-pub(super) fn offsets(mesh: &Mesh, samples: &[(ElementId, &[f64; 4])], origin: Point) -> Vec<Point> {
-    samples.iter().map(|(e, lambda)| sub(point_at(&mesh.vertices(*e), lambda), origin)).collect()
+pub(super) fn offsets(
+    mesh: &Mesh,
+    mirrors: &Mirrors,
+    samples: &[(Image, ElementId, &[f64; 4])],
+    origin: Point,
+) -> Vec<Point> {
+    let place = |(image, e, lambda): &(Image, ElementId, &[f64; 4])| {
+        mirrors.place(*image, point_at(&mesh.vertices(*e), lambda))
+    };
+    samples.iter().map(|sample| sub(place(sample), origin)).collect()
 }
 
 impl BlendedField<'_> {
@@ -204,15 +223,15 @@ impl BlendedField<'_> {
                 let own = q.map(|c| lambda * c);
                 let along: Vec<c64> = values.iter().map(|b| dot3(own, *b)).collect();
                 let by_points = patch.fit.value_by_points(&patch.weights, &along);
-                for ((place, weight), by_point) in
+                for (((image, place), weight), by_point) in
                     self.samples.places_of(patch).zip(&patch.weights).zip(by_points)
                 {
+                    let own = turned(&patch.mirrors.turn(image), own);
                     (0..3).for_each(|d| by_samples[place][d] += *weight * own[d]);
                     let (e, lambda) = self.samples.at(place);
+                    let by_point = patch.mirrors.direction(image, by_point.map(|c| c.re));
                     for (a, node) in topology.tet(e).iter().enumerate() {
-                        for d in 0..3 {
-                            by_positions[node.index()][d] += 2.0 * lambda[a] * by_point[d].re;
-                        }
+                        (0..3).for_each(|d| by_positions[node.index()][d] += 2.0 * lambda[a] * by_point[d]);
                     }
                 }
             }
@@ -247,17 +266,18 @@ impl Samples {
         (self.elements[place / count], &self.rule[place % count].0)
     }
 
-    /// The samples of a patch.
-    fn places_of<'p>(&'p self, patch: &'p Patch) -> impl Iterator<Item = usize> + 'p {
+    /// The samples of a patch, each itself or an image.
+    fn places_of<'p>(&'p self, patch: &'p Patch) -> impl Iterator<Item = (Image, usize)> + 'p {
         let count = self.rule.len();
         let first =
             move |e: &ElementId| self.elements.binary_search(e).expect("elements of all patches") * count;
-        patch.elements.iter().flat_map(move |e| first(e)..first(e) + count)
+        patch.members.iter().flat_map(move |(image, e)| (0..count).map(move |k| (*image, first(e) + k)))
     }
 
     /// `B` [T] at them.
     fn of(&self, patch: &Patch) -> Vec<Complex3> {
-        self.places_of(patch).map(|place| self.values[place]).collect()
+        let at = |(image, place): (Image, usize)| turned(&patch.mirrors.turn(image), self.values[place]);
+        self.places_of(patch).map(at).collect()
     }
 }
 

@@ -1,0 +1,243 @@
+//! Mirror images of elements beyond the symmetry planes of a model, by which a patch goes on there as in the whole device.
+//!
+//! At a flux-parallel plane with the unit normal `n` the field of the image is `B(Rx) = RB(x)` with `R = 1 − 2nnᵀ`, at a flux-normal
+//! one `−RB(x)`; the potential has the other sign. Planes at right angles to each other are taken, with the images of images;
+//! where faces with a condition make no plane, or one that the patch reaches behind, a patch ends there.
+
+use std::collections::BTreeSet;
+
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
+
+use crate::boundary::Boundary;
+use crate::model::FieldModel;
+
+/// Sine of an angle up to which directions count as one: faces of a fine mesh with coordinates of six digits have directions of
+/// their own.
+const ROUNDING: f64 = 1e-3;
+
+/// Share of the way to a point by which it may lie off a plane.
+const OFF: f64 = 1e-4;
+
+/// The faces on which a model has a flux-parallel or flux-normal condition, by node.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Walls {
+    /// Ascending by node.
+    faces: Vec<(NodeId, [NodeId; 3], Condition)>,
+}
+
+/// What holds on a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Condition {
+    FluxParallel,
+    FluxNormal,
+}
+
+/// A symmetry plane.
+#[derive(Clone, Copy, Debug)]
+struct Plane {
+    place: Point,
+    /// Of unit length.
+    normal: Point,
+    condition: Condition,
+}
+
+/// Which planes an image is beyond, a bit each; the element itself where it is zero.
+pub(super) type Image = u8;
+
+/// The symmetry planes around some element, at right angles to each other.
+#[derive(Clone, Debug)]
+pub(super) struct Mirrors {
+    planes: Vec<Plane>,
+    /// Planes through which there is no image.
+    refused: Vec<Plane>,
+    /// `B_r` [T] of the element: the image of a magnet that would be another one is none.
+    remanence: Point,
+}
+
+impl Walls {
+    /// # Errors
+    /// [`MeshError::UnknownSurface`].
+    pub(crate) fn new(topology: &Topology, boundaries: &[(String, Boundary)]) -> Result<Self, MeshError> {
+        let mut faces = Vec::new();
+        for (name, boundary) in boundaries {
+            let condition = match boundary {
+                Boundary::FluxParallel => Condition::FluxParallel,
+                Boundary::FluxNormal => Condition::FluxNormal,
+                Boundary::UniformField(_) => continue,
+            };
+            let of_face = |&face: &[NodeId; 3]| face.map(|node| (node, face, condition));
+            faces.extend(topology.surface(name)?.iter().flat_map(of_face));
+        }
+        faces.sort_unstable();
+        Ok(Self { faces })
+    }
+
+    /// The planes of the faces at a node; none where these do not lie in planes at right angles.
+    fn at(&self, mesh: &Mesh, node: NodeId) -> Vec<Plane> {
+        let first = self.faces.partition_point(|(of, ..)| *of < node);
+        let at_node = self.faces[first..].iter().take_while(|(of, ..)| *of == node);
+        let mut planes: Vec<Plane> = Vec::new();
+        for &(_, face, condition) in at_node {
+            let area = area_vector(face.map(|n| mesh.point(n)));
+            let normal = area.map(|c| c / norm(area));
+            let plane = Plane { place: mesh.point(node), normal, condition };
+            if planes.iter().any(|known| known.is_parallel(&plane) && known.condition == condition) {
+                continue;
+            }
+            if !planes.iter().all(|known| known.is_square_to(&plane)) {
+                return Vec::new();
+            }
+            planes.push(plane);
+        }
+        planes
+    }
+}
+
+impl Plane {
+    fn is_parallel(&self, other: &Self) -> bool {
+        let along = dot(self.normal, other.normal);
+        let rest: Point = std::array::from_fn(|d| other.normal[d] - along * self.normal[d]);
+        norm(rest) <= ROUNDING
+    }
+
+    fn is_square_to(&self, other: &Self) -> bool {
+        dot(self.normal, other.normal).abs() <= ROUNDING
+    }
+
+    /// How far a point lies off it on the side of the normal [m].
+    fn height(&self, x: Point) -> f64 {
+        dot(self.normal, sub(x, self.place))
+    }
+
+    fn holds(&self, x: Point) -> bool {
+        self.height(x).abs() <= OFF * norm(sub(x, self.place))
+    }
+
+    fn is(&self, other: &Self) -> bool {
+        self.condition == other.condition && self.is_parallel(other) && self.holds(other.place)
+    }
+
+    /// `Rv`.
+    fn reflect(&self, v: Point) -> Point {
+        let twice = 2.0 * dot(self.normal, v);
+        std::array::from_fn(|d| v[d] - twice * self.normal[d])
+    }
+
+    /// `B` at the image of where it is `b`.
+    fn turn(&self, b: Point) -> Point {
+        let reflected = self.reflect(b);
+        match self.condition {
+            Condition::FluxParallel => reflected,
+            Condition::FluxNormal => reflected.map(|c| -c),
+        }
+    }
+}
+
+impl Mirrors {
+    /// Around an element, of which none is known yet.
+    pub(super) fn new(model: &FieldModel, e: ElementId) -> Self {
+        Self { planes: Vec::new(), refused: Vec::new(), remanence: model.remanence_of(e) }
+    }
+
+    /// The planes that a node lies in; those at right angles to what is known become known.
+    fn of(&mut self, walls: &Walls, mesh: &Mesh, node: NodeId) -> Image {
+        let mut image = 0;
+        for plane in walls.at(mesh, node) {
+            let known = self.planes.iter().position(|known| known.is(&plane));
+            let is_new = || {
+                let change = norm(sub(plane.turn(self.remanence), self.remanence));
+                change <= ROUNDING * norm(self.remanence)
+                    && !self.refused.iter().any(|refused| refused.is(&plane))
+                    && self.planes.iter().all(|known| known.is_square_to(&plane))
+            };
+            if let Some(k) = known {
+                image |= 1 << k;
+            } else if is_new() {
+                image |= 1 << self.planes.len();
+                self.planes.push(plane);
+            }
+        }
+        image
+    }
+
+    /// Some elements, each itself or an image, with all those that share a vertex with one of them and count.
+    pub(super) fn around(
+        &mut self,
+        (model, mesh): (&FieldModel, &Mesh),
+        members: &BTreeSet<(Image, ElementId)>,
+        counts: &impl Fn(ElementId) -> bool,
+    ) -> BTreeSet<(Image, ElementId)> {
+        let mut all = BTreeSet::new();
+        for &(image, e) in members {
+            for node in model.topology().tet(e) {
+                let at_node = self.around_node((model, mesh), node, counts);
+                all.extend(at_node.into_iter().map(|(beyond, e)| (image ^ beyond, e)));
+            }
+        }
+        all
+    }
+
+    /// The elements at a node that count, with their images.
+    pub(super) fn around_node(
+        &mut self,
+        (model, mesh): (&FieldModel, &Mesh),
+        node: NodeId,
+        counts: &impl Fn(ElementId) -> bool,
+    ) -> BTreeSet<(Image, ElementId)> {
+        let planes = self.of(model.walls(), mesh, node);
+        let images =
+            move |e| (0..=planes).filter(move |image| image & !planes == 0).map(move |image| (image, e));
+        let elements = model.topology().elements_around(node).iter().copied().filter(|&e| counts(e));
+        elements.flat_map(images).collect()
+    }
+
+    /// Gives up the planes that some elements are on both sides of, as beside an edge at which the domain is re-entrant. Whether there
+    /// was one.
+    pub(super) fn give_up_crossed(&mut self, mesh: &Mesh, members: &BTreeSet<(Image, ElementId)>) -> bool {
+        let is_crossed = |plane: &Plane| {
+            let own = members.iter().filter(|(image, _)| *image == 0);
+            let off = own.flat_map(|(_, e)| mesh.vertices(*e)).filter(|&x| !plane.holds(x));
+            let sides: Vec<bool> = off.map(|x| plane.height(x) > 0.0).collect();
+            sides.iter().any(|side| *side != sides[0])
+        };
+        let (crossed, kept): (Vec<Plane>, Vec<Plane>) = self.planes.drain(..).partition(is_crossed);
+        let any = !crossed.is_empty();
+        self.refused.extend(crossed);
+        self.planes = kept;
+        any
+    }
+
+    fn through(&self, image: Image) -> impl Iterator<Item = &Plane> {
+        self.planes.iter().enumerate().filter(move |(k, _)| image >> k & 1 == 1).map(|(_, plane)| plane)
+    }
+
+    /// The image of a place.
+    pub(super) fn place(&self, image: Image, x: Point) -> Point {
+        self.through(image).fold(x, |x, plane| {
+            let twice = 2.0 * plane.height(x);
+            std::array::from_fn(|d| x[d] - twice * plane.normal[d])
+        })
+    }
+
+    /// The image of a direction.
+    pub(super) fn direction(&self, image: Image, v: Point) -> Point {
+        self.through(image).fold(v, |v, plane| plane.reflect(v))
+    }
+
+    /// The field at the image of where it is `b`, as a matrix, symmetric.
+    pub(super) fn turn(&self, image: Image) -> [Point; 3] {
+        let column = |axis: usize| {
+            let unit = std::array::from_fn(|d| f64::from(u8::from(d == axis)));
+            self.through(image).fold(unit, |b, plane| plane.turn(b))
+        };
+        [column(0), column(1), column(2)]
+    }
+
+    /// The image without the planes in which a place lies, as seen from another one: there it is its own image.
+    pub(super) fn distinct(&self, image: Image, x: Point, reach: f64) -> Image {
+        let planes = self.planes.iter().enumerate();
+        let holding = planes.filter(|(_, plane)| plane.height(x).abs() <= OFF * reach);
+        holding.fold(image, |image, (k, _)| image & !(1 << k))
+    }
+}

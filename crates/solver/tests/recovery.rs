@@ -1,0 +1,133 @@
+//! The field at points at the symmetry planes of a part of a device.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use fluxmorph_geometry::tet4::{Point, dot, sub};
+use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
+use fluxmorph_solver::element::Complex3;
+use fluxmorph_solver::recovery::probe;
+use fluxmorph_solver::{Boundary, ElementFamily, FieldModelSetup, Material, Order, UniformField};
+
+use crate::{ALL, lines, painted, solved};
+
+/// Half of a block in a box, cut at x = 0: x_min is a plane without flux across, z_min and z_max are crossed at right angles.
+fn half() -> Mesh {
+    let block = |x: Point| u32::from(x[0] < 0.02 && (0.02..0.04).contains(&x[1]) && x[2] < 0.02);
+    painted([lines(4, 0.01), lines(6, 0.01), lines(4, 0.01)], &["air", "block"], block)
+}
+
+/// A magnetic block in a field along z; all sides are given it that are in `applied`.
+fn setup((family, order): (ElementFamily, Order), parallel: &[&str], applied: &[&str]) -> FieldModelSetup {
+    let block = Material { relative_permeability: 4.0, conductivity: 0.0 };
+    let field = Boundary::UniformField(UniformField { flux_density: [0.0, 0.0, 1.0], centre: None });
+    let of = |names: &[&str], boundary: Boundary| -> Vec<(String, Boundary)> {
+        names.iter().map(|name| ((*name).to_owned(), boundary)).collect()
+    };
+    let mut boundaries = of(parallel, Boundary::FluxParallel);
+    boundaries.extend(of(&["z_min", "z_max"], Boundary::FluxNormal));
+    boundaries.extend(of(applied, field));
+    FieldModelSetup {
+        family,
+        order,
+        materials: vec![Material::AIR, block],
+        boundaries,
+        ..FieldModelSetup::default()
+    }
+}
+
+fn recovered(mesh: &Mesh, setup: FieldModelSetup, points: &[Point]) -> Vec<Complex3> {
+    let (model, solution) = solved(mesh, setup);
+    probe(&solution, &model, mesh, "points", points).expect("points of the mesh")
+}
+
+const HALF: [&str; 3] = ["x_max", "y_min", "y_max"];
+
+/// Beside the block and behind it, on both planes and off them.
+const POINTS: [Point; 6] = [
+    [0.0, 0.013, 0.0],
+    [0.0, 0.016, 0.007],
+    [0.0, 0.027, 0.026],
+    [0.003, 0.016, 0.0],
+    [0.027, 0.031, 0.0],
+    [0.002, 0.012, 0.003],
+];
+
+/// A mesh with its mirror image beyond x = 0.
+fn whole(half: &Mesh) -> Mesh {
+    let topology = half.topology();
+    let mut points: Vec<Point> = topology.nodes().map(|n| half.point(n)).collect();
+    let mut image = HashMap::new();
+    for n in topology.nodes() {
+        let [x, y, z] = half.point(n);
+        let beyond = if x == 0.0 { n } else { NodeId::new(points.len()) };
+        if x != 0.0 {
+            points.push([-x, y, z]);
+        }
+        image.insert(n, beyond);
+    }
+    // With two nodes exchanged, the volume keeps its sign.
+    let turned = |t: &[NodeId; 4]| [image[&t[1]], image[&t[0]], image[&t[2]], image[&t[3]]];
+    let tets = topology.tets().iter().copied().chain(topology.tets().iter().map(turned)).collect();
+    let regions: Vec<RegionId> = [topology.region_of(), topology.region_of()].concat();
+    let names = topology.region_names().to_vec();
+    let mut all = Topology::new(points.len(), tets, names, regions).expect("it conforms");
+    for name in ["y_min", "y_max", "z_min", "z_max", "x_max"] {
+        let own = topology.surface(name).expect("a side").to_vec();
+        let mirrored = own.iter().map(|t| t.map(|n| image[&n]));
+        let (own, other) = if name == "x_max" {
+            (own.clone(), mirrored.collect())
+        } else {
+            (own.iter().copied().chain(mirrored).collect(), Vec::new())
+        };
+        all = all.with_surface(name, own).expect("known nodes");
+        if name == "x_max" {
+            all = all.with_surface("x_min", other).expect("known nodes");
+        }
+    }
+    Mesh::new(Arc::new(all), points).expect("a mesh")
+}
+
+#[test]
+fn half_of_a_device_has_the_values_of_the_whole_at_every_point() {
+    let half = half();
+    let whole = whole(&half);
+    for elements in ALL {
+        let part = recovered(&half, setup(elements, &["x_min"], &HALF), &POINTS);
+        let all = recovered(&whole, setup(elements, &[], &["x_min", "x_max", "y_min", "y_max"]), &POINTS);
+        for ((part, all), place) in part.iter().zip(&all).zip(POINTS) {
+            let off = (0..3).map(|d| (part[d] - all[d]).norm()).fold(0.0, f64::max);
+            // Fields of order 1, by solutions to 1e-11.
+            assert!(off < 1e-8, "{elements:?} {place:?}: {part:?} {all:?}");
+        }
+    }
+}
+
+#[test]
+fn a_device_that_is_turned_has_the_same_values() {
+    let upright = half();
+    let turned = |[x, y, z]: Point| {
+        let (x, y) = (0.8 * x - 0.6 * y, 0.6 * x + 0.8 * y);
+        [x, 0.8 * y - 0.6 * z, 0.6 * y + 0.8 * z]
+    };
+    let back =
+        |v: Point| [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| dot(v, turned(axis)));
+    let points = upright.topology().nodes().map(|n| turned(upright.point(n))).collect();
+    let leaning = Mesh::new(Arc::clone(upright.topology()), points).expect("a mesh");
+    for elements in ALL {
+        let setup = setup(elements, &["x_min"], &HALF);
+        let mut turned_setup = setup.clone();
+        for (_, boundary) in &mut turned_setup.boundaries {
+            if let Boundary::UniformField(field) = boundary {
+                field.flux_density = turned(field.flux_density);
+            }
+        }
+        let before = recovered(&upright, setup, &POINTS);
+        let after = recovered(&leaning, turned_setup, &POINTS.map(turned));
+        for ((before, after), place) in before.iter().zip(&after).zip(POINTS) {
+            let off = sub(back(after.map(|c| c.re)), before.map(|c| c.re)).map(f64::abs);
+            // Fields of order 1, by solutions to 1e-11.
+            assert!(off.into_iter().fold(0.0, f64::max) < 1e-8, "{elements:?} {place:?}: {off:?}");
+        }
+    }
+}
