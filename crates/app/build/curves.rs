@@ -91,7 +91,8 @@ impl Curves {
              the fundamental alone is computed (effective reluctivity); that is an approximation"
                 .to_owned()
         });
-        let of_curves = self.curves.iter().flat_map(|own| [steep(own), warning(own)]);
+        let of_curves = self.curves.iter().filter(|(name, _)| used(name));
+        let of_curves = of_curves.flat_map(|own| [steep(own), warning(own)]);
         of_curves.flatten().chain(approximation).collect()
     }
 }

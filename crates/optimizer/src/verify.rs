@@ -285,14 +285,15 @@ pub fn measure(
             steps.iter().map(|&h| remainder(&direction, h)).collect::<Result<Vec<f64>, Error>>()?;
         let adjoint = slope_along(&direction);
         let h = settings.difference_step;
-        let odd = |h: f64| Ok::<_, Error>(value(&direction, h)? - value(&direction, -h)?);
-        let difference = (8.0 * odd(h)? - odd(2.0 * h)?) / (12.0 * h);
+        let [far_back, back, ahead, far_ahead] = [-2.0 * h, -h, h, 2.0 * h].map(|h| value(&direction, h));
+        let ([far_back, back], [ahead, far_ahead]) = ([far_back?, back?], [ahead?, far_ahead?]);
+        let difference = (8.0 * (ahead - back) - (far_ahead - far_back)) / (12.0 * h);
         let linear = remainders.iter().all(|&r| r.abs() <= ROUNDING);
-        // F(p) is solved by a factor of its own, all others by an iteration: a force may see the difference tenfold. It is what is
-        // left at h = 0 of the even part, whose curvature cancels.
-        let even = |h: f64| Ok::<_, Error>(0.5 * (value(&direction, h)? + value(&direction, -h)?) - 1.0);
-        let left = (4.0 * even(h)? - even(2.0 * h)?) / 3.0;
-        let off = if left.abs() <= MOST_OFF * settings.residual { left } else { 0.0 };
+        // F(p) is solved by a factor of its own, all others by an iteration: a force may see the difference tenfold. It is
+        // what is left at h = 0 of the even part, whose curvature cancels.
+        let left = (2.0 * (ahead + back) - 0.5 * (far_ahead + far_back)) / 3.0 - 1.0;
+        let known = 2.0 * settings.residual..=MOST_OFF * settings.residual;
+        let off = if known.contains(&left.abs()) { left } else { 0.0 };
         let bent: Vec<f64> = remainders.iter().map(|r| (r - off).abs()).collect();
         let clear = bent.iter().take_while(|&&r| r > settings.residual).count();
         let fitted = if clear < FEWEST { steps.len() } else { clear };

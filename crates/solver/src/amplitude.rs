@@ -1,10 +1,11 @@
 //! Time-harmonic iron: the curve at the largest and the least `|B|` of a period ([`crate::bh`]'s `phasor`).
 //!
-//! It is an approximation, the fundamental alone: real iron has harmonics. The law is no complex-differentiable function, its derivative
-//! is linear over the real numbers alone, and with eddy currents nothing is minimised either. Newton's steps are solved by GMRES
-//! over the real numbers (`linear::gmres`), preconditioned by the complex symmetric matrix with the mean of the derivative over the
-//! phases, the part of it that such a matrix can hold. With `∂F/∂u` as of a linear problem, `dF = 2 Re(dᵀ du)`, the adjoint
-//! law is the conjugate of the derivative along the conjugate: the same number `Re Lᵀ dH`, for the derivative is symmetric.
+//! It is an approximation, the fundamental alone: real iron has harmonics. The law is no complex-differentiable function, its
+//! derivative is linear over the real numbers alone, and with eddy currents nothing is minimised either. Newton's steps are solved
+//! by GMRES over the real numbers (`linear::gmres`), preconditioned by the complex symmetric matrix with the real part of the mean of
+//! the derivative over the phases, the part of it that such a matrix can hold. With `∂F/∂u` as of a linear problem,
+//! `dF = 2 Re(dᵀ du)`, the adjoint law is the conjugate of the derivative along the conjugate: the same number `Re Lᵀ dH`, for
+//! the derivative is symmetric.
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::scalar::{axpy, norm, ordered_sum};

@@ -9,7 +9,7 @@ use fluxmorph_solver::element::Complex3;
 use fluxmorph_solver::recovery::probe;
 use fluxmorph_solver::{Boundary, ElementFamily, FieldModelSetup, Material, Order, UniformField};
 
-use crate::{ALL, lines, painted, solved};
+use crate::{ALL, OUTSIDE, lines, painted, solved};
 
 /// Half of a block in a box, cut at x = 0: x_min is a plane without flux across, z_min and z_max are crossed at right angles.
 fn half() -> Mesh {
@@ -53,16 +53,17 @@ const POINTS: [Point; 6] = [
     [0.002, 0.012, 0.003],
 ];
 
-/// A mesh with its mirror image beyond x = 0.
-fn whole(half: &Mesh) -> Mesh {
+/// A mesh with its mirror image beyond the plane through zero at right angles to an axis; a side there is the image of the other one.
+fn doubled(half: &Mesh, axis: usize) -> Mesh {
     let topology = half.topology();
     let mut points: Vec<Point> = topology.nodes().map(|n| half.point(n)).collect();
     let mut image = HashMap::new();
     for n in topology.nodes() {
-        let [x, y, z] = half.point(n);
-        let beyond = if x == 0.0 { n } else { NodeId::new(points.len()) };
-        if x != 0.0 {
-            points.push([-x, y, z]);
+        let mut place = half.point(n);
+        let beyond = if place[axis] == 0.0 { n } else { NodeId::new(points.len()) };
+        if place[axis] != 0.0 {
+            place[axis] *= -1.0;
+            points.push(place);
         }
         image.insert(n, beyond);
     }
@@ -70,35 +71,36 @@ fn whole(half: &Mesh) -> Mesh {
     let turned = |t: &[NodeId; 4]| [image[&t[1]], image[&t[0]], image[&t[2]], image[&t[3]]];
     let tets = topology.tets().iter().copied().chain(topology.tets().iter().map(turned)).collect();
     let regions: Vec<RegionId> = [topology.region_of(), topology.region_of()].concat();
-    let names = topology.region_names().to_vec();
-    let mut all = Topology::new(points.len(), tets, names, regions).expect("it conforms");
-    for name in ["y_min", "y_max", "z_min", "z_max", "x_max"] {
-        let own = topology.surface(name).expect("a side").to_vec();
-        let mirrored = own.iter().map(|t| t.map(|n| image[&n]));
-        let (own, other) = if name == "x_max" {
-            (own.clone(), mirrored.collect())
-        } else {
-            (own.iter().copied().chain(mirrored).collect(), Vec::new())
+    let mut all =
+        Topology::new(points.len(), tets, topology.region_names().to_vec(), regions).expect("it conforms");
+    for (k, name) in OUTSIDE.into_iter().enumerate() {
+        let of = |name: &str| topology.surface(name).expect("a side").to_vec();
+        let mirrored = |name: &str| of(name).into_iter().map(|t| t.map(|n| image[&n])).collect();
+        let side = match k {
+            _ if k == 2 * axis => mirrored(OUTSIDE[k + 1]),
+            _ if k == 2 * axis + 1 => of(name),
+            _ => [of(name), mirrored(name)].concat(),
         };
-        all = all.with_surface(name, own).expect("known nodes");
-        if name == "x_max" {
-            all = all.with_surface("x_min", other).expect("known nodes");
-        }
+        all = all.with_surface(name, side).expect("known nodes");
     }
     Mesh::new(Arc::new(all), points).expect("a mesh")
 }
 
+/// At a flux-parallel plane, and at a flux-normal one.
 #[test]
 fn half_of_a_device_has_the_values_of_the_whole_at_every_point() {
     let half = half();
-    let whole = whole(&half);
+    let wholes =
+        [(doubled(&half, 0), &[][..], &OUTSIDE[..4]), (doubled(&half, 2), &["x_min"][..], &HALF[..])];
     for elements in ALL {
         let part = recovered(&half, setup(elements, &["x_min"], &HALF), &POINTS);
-        let all = recovered(&whole, setup(elements, &[], &["x_min", "x_max", "y_min", "y_max"]), &POINTS);
-        for ((part, all), place) in part.iter().zip(&all).zip(POINTS) {
-            let off = (0..3).map(|d| (part[d] - all[d]).norm()).fold(0.0, f64::max);
-            // Fields of order 1, by solutions to 1e-11.
-            assert!(off < 1e-8, "{elements:?} {place:?}: {part:?} {all:?}");
+        for (axis, (whole, parallel, applied)) in wholes.iter().enumerate() {
+            let all = recovered(whole, setup(elements, parallel, applied), &POINTS);
+            for ((part, all), place) in part.iter().zip(&all).zip(POINTS) {
+                let off = (0..3).map(|d| (part[d] - all[d]).norm()).fold(0.0, f64::max);
+                // Fields of order 1, by solutions to 1e-11.
+                assert!(off < 1e-8, "{elements:?} {axis} {place:?}: {part:?} {all:?}");
+            }
         }
     }
 }

@@ -16,8 +16,8 @@ table! {
     /// place of a number, an anisotropic material, is refused.
     ///
     /// A curve holds for static fields, and above 0 Hz where the flux density is largest and least in a period, of which the
-    /// fundamental alone is computed: at the peak of a field in one direction, all the time in one that turns. That is an
-    /// approximation.
+    /// fundamental alone is computed: at the peak of a field in one direction, all the time in one that turns with constant
+    /// size. That is an approximation.
     ///
     /// ```toml
     /// [materials.steel]

@@ -131,7 +131,7 @@ impl PhasorLaw {
         self.derivative(of.map(|c| c.conj())).map(|c| c.conj())
     }
 
-    /// The real tensor that is nearest to the derivative [m/H]: its mean over the phases of `dB`.
+    /// The real tensor that is nearest to the derivative [m/H]: the real part of its mean over the phases of `dB`.
     pub(crate) fn mean(&self) -> Tangent {
         let [first, second] = self.axes;
         let third = cross(first, second);

@@ -191,8 +191,9 @@ fn conditioned(model: &FieldModel) -> impl Iterator<Item = (NodeId, Point)> + '_
     of_planes.chain(unknowns.oblique_nodes().iter().copied())
 }
 
-/// What a normal must have beside directions that are held [1] to be another one, and not of a face of the same surface.
-const INDEPENDENT: f64 = 1e-2;
+/// What a normal must have beside directions that are held [1] to be another one, and not of a face of the same surface, which may
+/// be curved: the sine of 17 degrees.
+const INDEPENDENT: f64 = 0.3;
 
 /// Adds to some directions what a normal has beside them.
 fn hold(held: &mut Vec<Point>, normal: Point) {

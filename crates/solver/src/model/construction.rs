@@ -9,6 +9,7 @@ use crate::circuit::{self, Solids, Windings, solids};
 use crate::coil::continuity;
 use crate::discretisation::Discretisation;
 use crate::distributed::{Distributed, Follower};
+use crate::elements::ElementFamily;
 use crate::error::SolverError;
 use crate::linear::{FieldKind, SystemAnalysis, SystemPattern};
 use crate::load::Sources;
@@ -53,6 +54,8 @@ impl FieldModel {
         setup::check_coils(mesh, &setup)?;
         let conductors = weak_form.conductors();
         solids::check(mesh, &setup.coils, (&conductors, &setup.materials), &setup.boundaries)?;
+        let gradients: &[_] = if setup.family == ElementFamily::Nodal { &conductors.surface } else { &[] };
+        let walls = Walls::new(mesh.topology(), &setup.boundaries, gradients)?;
         // The net current of a solid conductor is given: no other returns through it.
         let conductors = conductors.without(&solids::elements(&setup.coils));
         let mut joined = conductors.joined(mesh, &setup.boundaries)?;
@@ -61,7 +64,6 @@ impl FieldModel {
         if let Some(shell) = weak_form.shell() {
             setup::check_open(shell, mesh, &setup, sources.coil_elements())?;
         }
-        let walls = Walls::new(mesh.topology(), &setup.boundaries)?;
         let shared = Arc::new(SharedParts { fine, solids, walls, analysis: analysis.map(Arc::new) });
         let (setup, weak_form) = (Arc::new(setup), Arc::new(weak_form));
         let (sources, windings) = (Arc::new(sources), Arc::new(windings));

@@ -90,10 +90,10 @@ impl Frame {
 }
 
 impl Fit {
-    /// With the weight `exp(−|ξ|²/2)` in the scaled coordinates, in which 3 is the mean of `|ξ|²`, that lets the nearest points count most;
-    /// `None` where the points do not determine the polynomial.
-    pub(super) fn new(degree: usize, points: &[Point]) -> Option<Self> {
-        Self::weighted(degree, points, |square| (-0.5 * square).exp())
+    /// With the weight `exp(−k|ξ|²)` in the scaled coordinates, in which 3 is the mean of `|ξ|²`, that lets the nearest points count
+    /// most; `None` where the points do not determine the polynomial.
+    pub(super) fn new(degree: usize, points: &[Point], k: f64) -> Option<Self> {
+        Self::weighted(degree, points, |square| (-k * square).exp())
     }
 
     /// All points count alike: a smooth function of their places, whatever the scale. `None` as above.
@@ -227,7 +227,7 @@ mod tests {
         let quadratic =
             |[x, y, z]: Point| 0.4 + 2.0 * x - y + 70.0 * z + 3.0 * x * y - 2.0 * z * z + 9.0 * y * z + x * x;
         let points = grid([3, 3, 3]);
-        let fit = Fit::new(2, &points).expect("27 points determine a quadratic");
+        let fit = Fit::new(2, &points, 0.5).expect("27 points determine a quadratic");
         let gradients = fit.gradient();
         for (d, exact) in [2.0, -1.0, 70.0].into_iter().enumerate() {
             let sum: f64 = gradients.iter().zip(&points).map(|(g, &p)| g[d] * quadratic(p)).sum();
@@ -244,7 +244,7 @@ mod tests {
             grid([4, 3, 4]).into_iter().map(|[x, y, z]| [x + 0.003, y - 0.2, z + 0.1 * x * x]).collect();
         let rough = |k: usize| (7.3 * k as f64).sin();
         let slope = |points: &[Point], along: Point| -> f64 {
-            let gradients = Fit::new(2, points).expect("48 points determine a quadratic").gradient();
+            let gradients = Fit::new(2, points, 0.5).expect("48 points determine a quadratic").gradient();
             let along = |g: &Point| (0..3).map(|d| g[d] * along[d]).sum::<f64>();
             gradients.iter().enumerate().map(|(k, g)| rough(k) * along(g)).sum()
         };
@@ -295,7 +295,7 @@ mod tests {
     fn points_that_leave_a_coefficient_open_are_refused() {
         for lines in [[3, 3, 2], [3, 3, 1], [9, 2, 1]] {
             let points = grid(lines);
-            assert!(Fit::new(2, &points).is_none(), "{lines:?}");
+            assert!(Fit::new(2, &points, 0.5).is_none(), "{lines:?}");
         }
     }
 }

@@ -1,25 +1,23 @@
 //! Mirror images of elements beyond the symmetry planes of a model, by which a patch goes on there as in the whole device.
 //!
-//! At a flux-parallel plane with the unit normal `n` the field of the image is `B(Rx) = RB(x)` with `R = 1 − 2nnᵀ`, at a flux-normal
-//! one `−RB(x)`; the potential has the other sign. Planes at right angles to each other are taken, with the images of images;
-//! where faces with a condition make no plane, or one that the patch reaches behind, a patch ends there.
+//! At a flux-parallel plane with the unit normal `n` the field of the image is `B(Rx) = RB(x)` with `R = 1 − 2nnᵀ`, at a
+//! flux-normal one `−RB(x)`; the potential has the other sign. Planes at right angles to each other are taken, with the images of
+//! images. A patch ends at all other outer faces, and at a plane in which a part of them lies or which elements lie behind.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
-use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
 
 use crate::boundary::Boundary;
 use crate::model::FieldModel;
 
-/// Sine of an angle up to which directions count as one: faces of a fine mesh with coordinates of six digits have directions of
-/// their own.
+/// Sine of an angle up to which directions count as one, and share of the way to a point by which it may lie off a plane: faces
+/// of a fine mesh with coordinates of six digits have directions of their own.
 const ROUNDING: f64 = 1e-3;
 
-/// Share of the way to a point by which it may lie off a plane.
-const OFF: f64 = 1e-4;
-
-/// The faces on which a model has a flux-parallel or flux-normal condition, by node.
+/// The outer faces of a model with what makes an image there, by node.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Walls {
     /// Ascending by node.
@@ -31,6 +29,8 @@ pub(crate) struct Walls {
 enum Condition {
     FluxParallel,
     FluxNormal,
+    /// Anything else: `A` is given, is a gradient along the face, or free.
+    Other,
 }
 
 /// A symmetry plane.
@@ -56,25 +56,41 @@ pub(super) struct Mirrors {
 }
 
 impl Walls {
+    /// Of the conditions of a model. On the `gradients`, faces of walls beside re-entrant edges, nodal `A_t` is `−∇ψ` and not zero.
+    ///
     /// # Errors
     /// [`MeshError::UnknownSurface`].
-    pub(crate) fn new(topology: &Topology, boundaries: &[(String, Boundary)]) -> Result<Self, MeshError> {
-        let mut faces = Vec::new();
+    pub(crate) fn new(
+        topology: &Topology,
+        boundaries: &[(String, Boundary)],
+        gradients: &[[NodeId; 3]],
+    ) -> Result<Self, MeshError> {
+        let mut conditions = HashMap::new();
         for (name, boundary) in boundaries {
             let condition = match boundary {
                 Boundary::FluxParallel => Condition::FluxParallel,
                 Boundary::FluxNormal => Condition::FluxNormal,
-                Boundary::UniformField(_) => continue,
+                Boundary::UniformField(_) => Condition::Other,
             };
-            let of_face = |&face: &[NodeId; 3]| face.map(|node| (node, face, condition));
-            faces.extend(topology.surface(name)?.iter().flat_map(of_face));
+            for face in topology.surface(name)? {
+                let known = conditions.entry(face_key(*face)).or_insert(condition);
+                *known = if *known == condition { condition } else { Condition::Other };
+            }
         }
+        conditions.extend(gradients.iter().map(|face| (face_key(*face), Condition::Other)));
+        let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
+        let of_face = |facet: &Facet| {
+            let condition = conditions.get(&face_key(facet.nodes)).copied().unwrap_or(Condition::Other);
+            facet.nodes.map(|node| (node, facet.nodes, condition))
+        };
+        let mut faces: Vec<_> = outer.flat_map(of_face).collect();
         faces.sort_unstable();
         Ok(Self { faces })
     }
 
-    /// The planes of the faces at a node; none where these do not lie in planes at right angles.
-    fn at(&self, mesh: &Mesh, node: NodeId) -> Vec<Plane> {
+    /// The planes of the outer faces at a node that are at right angles to each other; one with a part of another condition, or with
+    /// an element at the node behind it, as one of another condition.
+    fn at(&self, topology: &Topology, mesh: &Mesh, node: NodeId) -> Vec<Plane> {
         let first = self.faces.partition_point(|(of, ..)| *of < node);
         let at_node = self.faces[first..].iter().take_while(|(of, ..)| *of == node);
         let mut planes: Vec<Plane> = Vec::new();
@@ -82,13 +98,16 @@ impl Walls {
             let area = area_vector(face.map(|n| mesh.point(n)));
             let normal = area.map(|c| c / norm(area));
             let plane = Plane { place: mesh.point(node), normal, condition };
-            if planes.iter().any(|known| known.is_parallel(&plane) && known.condition == condition) {
-                continue;
+            if let Some(known) = planes.iter_mut().find(|known| known.is_parallel(&plane)) {
+                known.condition = if known.condition == condition { condition } else { Condition::Other };
+            } else if planes.iter().all(|known| known.is_square_to(&plane)) {
+                planes.push(plane);
             }
-            if !planes.iter().all(|known| known.is_square_to(&plane)) {
-                return Vec::new();
+        }
+        for plane in &mut planes {
+            if plane.is_crossed(topology.elements_around(node).iter().flat_map(|&e| mesh.vertices(e))) {
+                plane.condition = Condition::Other;
             }
-            planes.push(plane);
         }
         planes
     }
@@ -111,11 +130,19 @@ impl Plane {
     }
 
     fn holds(&self, x: Point) -> bool {
-        self.height(x).abs() <= OFF * norm(sub(x, self.place))
+        self.height(x).abs() <= ROUNDING * norm(sub(x, self.place))
     }
 
-    fn is(&self, other: &Self) -> bool {
-        self.condition == other.condition && self.is_parallel(other) && self.holds(other.place)
+    /// Whether both are the same plane, whatever their conditions.
+    fn lies_in(&self, other: &Self) -> bool {
+        self.is_parallel(other) && self.holds(other.place)
+    }
+
+    /// Whether points lie on both sides of it.
+    fn is_crossed(&self, points: impl Iterator<Item = Point>) -> bool {
+        let mut sides = points.filter(|&x| !self.holds(x)).map(|x| self.height(x) > 0.0);
+        let first = sides.next();
+        sides.any(|side| Some(side) != first)
     }
 
     /// `Rv`.
@@ -127,10 +154,17 @@ impl Plane {
     /// `B` at the image of where it is `b`.
     fn turn(&self, b: Point) -> Point {
         let reflected = self.reflect(b);
-        match self.condition {
-            Condition::FluxParallel => reflected,
-            Condition::FluxNormal => reflected.map(|c| -c),
+        if self.condition == Condition::FluxNormal { reflected.map(|c| -c) } else { reflected }
+    }
+
+    /// The same, at right angles to others to the last digit: reflections then commute.
+    fn squared_to(mut self, others: &[Self]) -> Self {
+        for other in others {
+            let along = dot(other.normal, self.normal);
+            (0..3).for_each(|d| self.normal[d] -= along * other.normal[d]);
         }
+        let length = norm(self.normal);
+        Self { normal: self.normal.map(|c| c / length), ..self }
     }
 }
 
@@ -141,20 +175,24 @@ impl Mirrors {
     }
 
     /// The planes that a node lies in; those at right angles to what is known become known.
-    fn of(&mut self, walls: &Walls, mesh: &Mesh, node: NodeId) -> Image {
+    fn of(&mut self, (model, mesh): (&FieldModel, &Mesh), node: NodeId) -> Image {
         let mut image = 0;
-        for plane in walls.at(mesh, node) {
-            let known = self.planes.iter().position(|known| known.is(&plane));
-            let is_new = || {
-                let change = norm(sub(plane.turn(self.remanence), self.remanence));
-                change <= ROUNDING * norm(self.remanence)
-                    && !self.refused.iter().any(|refused| refused.is(&plane))
-                    && self.planes.iter().all(|known| known.is_square_to(&plane))
-            };
-            if let Some(k) = known {
+        for plane in model.walls().at(model.topology(), mesh, node) {
+            let change = norm(sub(plane.turn(self.remanence), self.remanence));
+            if plane.condition == Condition::Other || change > ROUNDING * norm(self.remanence) {
+                self.refused.push(plane);
+                continue;
+            }
+            let known = self.planes.iter().position(|known| known.lies_in(&plane));
+            if let Some(k) = known.filter(|&k| self.planes[k].condition == plane.condition) {
                 image |= 1 << k;
-            } else if is_new() {
+            } else if known.is_some() {
+                self.refused.push(plane);
+            } else if !self.refused.iter().any(|refused| refused.lies_in(&plane))
+                && self.planes.iter().all(|known| known.is_square_to(&plane))
+            {
                 image |= 1 << self.planes.len();
+                let plane = plane.squared_to(&self.planes);
                 self.planes.push(plane);
             }
         }
@@ -185,25 +223,25 @@ impl Mirrors {
         node: NodeId,
         counts: &impl Fn(ElementId) -> bool,
     ) -> BTreeSet<(Image, ElementId)> {
-        let planes = self.of(model.walls(), mesh, node);
+        let planes = self.of((model, mesh), node);
         let images =
             move |e| (0..=planes).filter(move |image| image & !planes == 0).map(move |image| (image, e));
         let elements = model.topology().elements_around(node).iter().copied().filter(|&e| counts(e));
         elements.flat_map(images).collect()
     }
 
-    /// Gives up the planes that some elements are on both sides of, as beside an edge at which the domain is re-entrant. Whether there
-    /// was one.
+    /// Gives up the planes that some elements are on both sides of, as beside an edge at which the domain is re-entrant, and those in
+    /// which a node has faces of another condition. Whether there was one.
     pub(super) fn give_up_crossed(&mut self, mesh: &Mesh, members: &BTreeSet<(Image, ElementId)>) -> bool {
-        let is_crossed = |plane: &Plane| {
+        let is_given_up = |plane: &Plane| {
             let own = members.iter().filter(|(image, _)| *image == 0);
-            let off = own.flat_map(|(_, e)| mesh.vertices(*e)).filter(|&x| !plane.holds(x));
-            let sides: Vec<bool> = off.map(|x| plane.height(x) > 0.0).collect();
-            sides.iter().any(|side| *side != sides[0])
+            self.refused.iter().any(|refused| refused.lies_in(plane))
+                || plane.is_crossed(own.flat_map(|(_, e)| mesh.vertices(*e)))
         };
-        let (crossed, kept): (Vec<Plane>, Vec<Plane>) = self.planes.drain(..).partition(is_crossed);
-        let any = !crossed.is_empty();
-        self.refused.extend(crossed);
+        let (given_up, kept): (Vec<Plane>, Vec<Plane>) =
+            self.planes.iter().partition(|plane| is_given_up(plane));
+        let any = !given_up.is_empty();
+        self.refused.extend(given_up);
         self.planes = kept;
         any
     }
@@ -237,7 +275,7 @@ impl Mirrors {
     /// The image without the planes in which a place lies, as seen from another one: there it is its own image.
     pub(super) fn distinct(&self, image: Image, x: Point, reach: f64) -> Image {
         let planes = self.planes.iter().enumerate();
-        let holding = planes.filter(|(_, plane)| plane.height(x).abs() <= OFF * reach);
+        let holding = planes.filter(|(_, plane)| plane.height(x).abs() <= ROUNDING * reach);
         holding.fold(image, |image, (k, _)| image & !(1 << k))
     }
 }

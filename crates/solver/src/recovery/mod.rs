@@ -42,6 +42,13 @@ pub(crate) use places::{BlendedField, FixedPlaces};
 /// Layers of elements around the probed one after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
 
+/// How fast the weight of a node falls, and that of a point within an element ([`Fit::new`]): most nodes lie on the rim of a patch,
+/// and where it lies to one side of the point, values of `B` far from it keep a fit from swinging there. Of the values from
+/// 0.2 to 1 the best around a sphere in a field, on the axes of coils and at the end of a mesh.
+const OF_NODES: f64 = 1.0 / 2.0;
+/// See there.
+const OF_SAMPLES: f64 = 1.0 / 3.0;
+
 /// The recovered flux density at a point of an element as a linear function of the field, on one mesh.
 ///
 /// `A` at the nodes of all elements that share a vertex with `element` and have its material, fitted by least squares with a
@@ -245,7 +252,7 @@ fn of_potentials(
     let nodes: BTreeSet<(Image, CarrierId)> = members.iter().flat_map(of_member).collect();
     let offset = |&(image, n)| sub(mirrors.place(image, space.position(mesh, n)), point);
     let offsets: Vec<Point> = nodes.iter().map(offset).collect();
-    let gradients = Fit::new(space.order().degree() + 1, &offsets)?.gradient();
+    let gradients = Fit::new(space.order().degree() + 1, &offsets, OF_NODES)?.gradient();
     let weights = nodes.into_iter().zip(gradients);
     let weights = weights.map(|((image, n), g)| (image, (n, mirrors.direction(image, g))));
     Some(by_image(mirrors, weights, Weights::Potentials))
@@ -260,7 +267,8 @@ fn of_flux_densities(
 ) -> Option<Vec<([Point; 3], Weights)>> {
     let order = model.space().order();
     let samples = samples_in(order, members);
-    let weights = Fit::new(order.degree(), &places::offsets(mesh, mirrors, &samples, point))?.value();
+    let weights =
+        Fit::new(order.degree(), &places::offsets(mesh, mirrors, &samples, point), OF_SAMPLES)?.value();
     let weights = samples.into_iter().zip(weights).map(|((image, e, lambda), w)| (image, (e, *lambda, w)));
     Some(by_image(mirrors, weights, Weights::FluxDensities))
 }
