@@ -245,9 +245,10 @@ fn quick_rows() -> Vec<Row> {
     let solids = SPHERES.map(|name| solid(name, Order::Quadratic, 1.0, [0.02, 0.03, 0.03]));
     let mut rows = solids.concat();
     rows.extend(hollow(Order::Quadratic, 1.0, 0.02));
-    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 1.0, 0.02));
+    // Flat faces enclose less magnet than the sphere: the field outside is too small.
+    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 1.0, 0.025));
     // As of AlNiCo, whose recoil line is the steepest.
-    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 3.6, 0.02));
+    rows.extend(magnet(Order::Quadratic, 4.0 / 3.0, 3.6, 0.025));
     rows
 }
 

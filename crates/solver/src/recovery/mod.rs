@@ -44,8 +44,8 @@ const LAYERS_LIMIT: usize = 3;
 
 /// How fast the weight of a node falls, and that of a point within an element ([`Fit::new`]): most nodes lie on the rim of a patch,
 /// and where it lies to one side of the point, values of `B` far from it keep a fit from swinging there. Of the values from
-/// 0.2 to 1 the best around a sphere in a field, on the axes of coils and at the end of a mesh.
-const OF_NODES: f64 = 1.0 / 2.0;
+/// 0.2 to 1.5 the best around a sphere in a field, on the axes of coils, behind the paper's plate and at the end of a mesh.
+const OF_NODES: f64 = 1.0;
 /// See there.
 const OF_SAMPLES: f64 = 1.0 / 3.0;
 
