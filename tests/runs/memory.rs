@@ -62,6 +62,13 @@ fn the_estimate_holds_for_larger_devices_and_every_kind_of_solver() {
     assert_estimated("solve", "shield.toml", &["--set", fine, "--set", no_check, "--set", no_estimate]);
 }
 
+/// A shell's limit on data of so many KiB beside the addresses of the dense kernels, which go by the machine's cache.
+#[cfg(unix)]
+fn limit_of(kib: usize) -> String {
+    let kib = kib + fluxmorph_geometry::fem::workspace::bytes_per_thread() / 1024;
+    format!("ulimit -d {kib} && exec \"$@\"")
+}
+
 /// The run has room in the memory that it is given, and the check of its best design on halved elements has not.
 #[cfg(unix)]
 #[test]
@@ -72,7 +79,7 @@ fn a_check_on_finer_elements_that_does_not_fit_is_skipped_with_a_notice() {
     let options = ["--max-evaluations", "2", "--threads", "1"];
     let mut command = std::process::Command::new("sh");
     // 131 MiB are held by the run with elements of second order, some 600 by the check.
-    command.args(["-c", "ulimit -d 307200 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
+    command.args(["-c", &limit_of(240_000), "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
     command.args(["run", &path, "--out", &out]).args(options);
     finish(&mut command).with(1, &["the best shape is not checked on a finer mesh, which takes about"]);
     assert!(
@@ -92,7 +99,7 @@ fn a_mesh_that_the_memory_does_not_let_refine_is_searched_on_as_it_is() {
     let out = folder.path().join("out");
     let run = device.command("run", &out);
     let mut command = std::process::Command::new("sh");
-    command.args(["-c", "ulimit -d 115000 && exec \"$@\"", "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
+    command.args(["-c", &limit_of(50_000), "sh", env!("CARGO_BIN_EXE_fluxmorph")]);
     command.args(run.get_args()).args(["--threads", "1"]);
     finish(&mut command)
         .completed()

@@ -45,8 +45,15 @@ const LAYERS_LIMIT: usize = 3;
 /// How fast the weight of a node falls, and that of a point within an element ([`Fit::new`]): most nodes lie on the rim of a patch,
 /// and where it lies to one side of the point, values of `B` far from it keep a fit from swinging there. Of the values from
 /// 0.2 to 1.5 the best around a sphere in a field, on the axes of coils, behind the paper's plate and at the end of a mesh.
-const OF_NODES: f64 = 1.0;
-/// See there.
+fn of_nodes(order: Order) -> f64 {
+    match order {
+        Order::Linear => 1.0,
+        // A cubic needs more of them.
+        Order::Quadratic => 1.0 / 2.0,
+    }
+}
+
+/// See [`of_nodes`].
 const OF_SAMPLES: f64 = 1.0 / 3.0;
 
 /// The recovered flux density at a point of an element as a linear function of the field, on one mesh.
@@ -252,7 +259,7 @@ fn of_potentials(
     let nodes: BTreeSet<(Image, CarrierId)> = members.iter().flat_map(of_member).collect();
     let offset = |&(image, n)| sub(mirrors.place(image, space.position(mesh, n)), point);
     let offsets: Vec<Point> = nodes.iter().map(offset).collect();
-    let gradients = Fit::new(space.order().degree() + 1, &offsets, OF_NODES)?.gradient();
+    let gradients = Fit::new(space.order().degree() + 1, &offsets, of_nodes(space.order()))?.gradient();
     let weights = nodes.into_iter().zip(gradients);
     let weights = weights.map(|((image, n), g)| (image, (n, mirrors.direction(image, g))));
     Some(by_image(mirrors, weights, Weights::Potentials))
