@@ -8,7 +8,7 @@
 //! the true field jumps, and at the face of a winding its slope does, so only elements of the probed element's material and coil
 //! take part.
 //!
-//! At a symmetry plane the patch goes on with its images ([`mirror`]), so that part of a device has the values of the whole.
+//! At a symmetry plane the patch goes on with its images (`mirror`), so that part of a device has the values of the whole.
 //!
 //! A recovered value is linear in the field: [`RecoveredPoint`] holds its weights, for values and for derivatives.
 //!
