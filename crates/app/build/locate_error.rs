@@ -206,8 +206,8 @@ impl Blame<'_> {
             SolverError::PointOutside { wanted_by: PointsOf::Expansion(name), .. } => {
                 let index = self.config.multipoles.iter().position(|own| own.name == *name)?;
                 Some(self.at(&format!("multipoles[{index}].radius"), error)?.expected(
-                    "all of the circle or ball in the mesh, or in its image behind a symmetry plane through the centre, at right angles to a \
-                     coordinate axis",
+                    "all of the circle or ball in the mesh, or in its image behind a symmetry plane through the \
+                     centre, at right angles to a coordinate axis",
                 ))
             }
             SolverError::Mesh(error) => self.mesh(error),

@@ -244,7 +244,8 @@ fn span(problem: &Problem) -> Vec<f64> {
     shape.upper().iter().zip(shape.lower()).map(|(high, low)| high - low).collect()
 }
 
-/// Measures the certificate of any function with the value `objective` and what is said to be its gradient at `p`; `span` scales the directions.
+/// Measures the certificate of any function with the value `objective` and what is said to be its gradient at `p`; `span` scales
+/// the directions.
 ///
 /// # Errors
 /// When an evaluation fails.
@@ -268,43 +269,11 @@ pub fn measure(
     let slope_along = |direction: &[f64]| -> f64 {
         gradient.iter().zip(direction).map(|(g, d)| g * d).sum::<f64>() / objective
     };
-    let remainder = |direction: &[f64], h: f64| -> Result<f64, Error> {
-        Ok(value(direction, h)? - 1.0 - h * slope_along(direction))
-    };
     let mut random = fastrand::Rng::with_seed(settings.seed);
     let mut directions = Vec::with_capacity(settings.directions);
     for index in 0..settings.directions {
-        let mut direction: Vec<f64> = span.iter().map(|span| span * (2.0 * random.f64() - 1.0)).collect();
-        let [back, ahead] = [-1.0, 1.0].map(|side| remainder(&direction, side * settings.first_step));
-        if back?.abs() > ahead?.abs() {
-            direction.iter_mut().for_each(|d| *d = -*d);
-        }
-        let steps: Vec<f64> =
-            (0..=settings.halvings).map(|k| settings.first_step * 0.5_f64.powi(k as i32)).collect();
-        let remainders =
-            steps.iter().map(|&h| remainder(&direction, h)).collect::<Result<Vec<f64>, Error>>()?;
-        let adjoint = slope_along(&direction);
-        let h = settings.difference_step;
-        let [far_back, back, ahead, far_ahead] = [-2.0 * h, -h, h, 2.0 * h].map(|h| value(&direction, h));
-        let ([far_back, back], [ahead, far_ahead]) = ([far_back?, back?], [ahead?, far_ahead?]);
-        let difference = (8.0 * (ahead - back) - (far_ahead - far_back)) / (12.0 * h);
-        let linear = remainders.iter().all(|&r| r.abs() <= ROUNDING);
-        // F(p) is solved by a factor of its own, all others by an iteration: a force may see the difference tenfold. It is
-        // what is left at h = 0 of the even part, whose curvature cancels.
-        let left = (2.0 * (ahead + back) - 0.5 * (far_ahead + far_back)) / 3.0 - 1.0;
-        let known = 2.0 * settings.residual..=MOST_OFF * settings.residual;
-        let off = if known.contains(&left.abs()) { left } else { 0.0 };
-        let bent: Vec<f64> = remainders.iter().map(|r| (r - off).abs()).collect();
-        let clear = bent.iter().take_while(|&&r| r > settings.residual).count();
-        let fitted = if clear < FEWEST { steps.len() } else { clear };
-        let measured = Direction {
-            slope: if linear { 2.0 } else { fitted_slope(&steps[..fitted], &bent[..fitted]) },
-            steps,
-            remainders: remainders.into_iter().map(f64::abs).collect(),
-            adjoint,
-            difference,
-            error: (difference - adjoint).abs() / adjoint.abs().max(settings.least_change()),
-        };
+        let direction: Vec<f64> = span.iter().map(|span| span * (2.0 * random.f64() - 1.0)).collect();
+        let measured = measure_along(&|h| value(&direction, h), slope_along(&direction), settings)?;
         progress(index, &measured);
         directions.push(measured);
     }
@@ -314,6 +283,43 @@ pub fn measure(
     let holds =
         directions.iter().all(|d| d.slope >= settings.least_slope && d.error <= settings.largest_error);
     Ok(Certificate { objective, directions, least_slope, largest_error, holds })
+}
+
+/// Along one direction, of the function relative to its value at the design and its slope by the gradient. Of the two ways along
+/// it that in which the function bends more.
+fn measure_along(
+    value: &impl Fn(f64) -> Result<f64, Error>,
+    slope: f64,
+    settings: &Settings,
+) -> Result<Direction, Error> {
+    let remainder = |h: f64| -> Result<f64, Error> { Ok(value(h)? - 1.0 - h * slope) };
+    let [back, ahead] = [-1.0, 1.0].map(|side| remainder(side * settings.first_step));
+    let way = if back?.abs() > ahead?.abs() { -1.0 } else { 1.0 };
+    let steps: Vec<f64> =
+        (0..=settings.halvings).map(|k| settings.first_step * 0.5_f64.powi(k as i32)).collect();
+    let remainders = steps.iter().map(|&h| remainder(way * h)).collect::<Result<Vec<f64>, Error>>()?;
+    let adjoint = way * slope;
+    let h = settings.difference_step;
+    let [far_back, back, ahead, far_ahead] = [-2.0 * h, -h, h, 2.0 * h].map(|h| value(way * h));
+    let ([far_back, back], [ahead, far_ahead]) = ([far_back?, back?], [ahead?, far_ahead?]);
+    let difference = (8.0 * (ahead - back) - (far_ahead - far_back)) / (12.0 * h);
+    let linear = remainders.iter().all(|&r| r.abs() <= ROUNDING);
+    // F(p) is solved by a factor of its own, all others by an iteration: a force may see the difference tenfold. It is
+    // what is left at h = 0 of the even part, whose curvature cancels.
+    let left = (2.0 * (ahead + back) - 0.5 * (far_ahead + far_back)) / 3.0 - 1.0;
+    let known = 2.0 * settings.residual..=MOST_OFF * settings.residual;
+    let off = if known.contains(&left.abs()) { left } else { 0.0 };
+    let bent: Vec<f64> = remainders.iter().map(|r| (r - off).abs()).collect();
+    let clear = bent.iter().take_while(|&&r| r > settings.residual).count();
+    let fitted = if clear < FEWEST { steps.len() } else { clear };
+    Ok(Direction {
+        slope: if linear { 2.0 } else { fitted_slope(&steps[..fitted], &bent[..fitted]) },
+        steps,
+        remainders: remainders.into_iter().map(f64::abs).collect(),
+        adjoint,
+        difference,
+        error: (difference - adjoint).abs() / adjoint.abs().max(settings.least_change()),
+    })
 }
 
 /// Least-squares slope of `log y` over `log x`.

@@ -6,7 +6,7 @@ use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 
 use crate::error::SolverError;
-use crate::fixed_directions::axis_of;
+use crate::fixed_directions::{axis_of, beside};
 
 /// Share of an applied field's largest `|A|` that may be left where another condition says otherwise. A face of a fine mesh with
 /// coordinates of six digits has a direction of its own; the error of what is left is of this size, too.
@@ -77,11 +77,7 @@ pub(crate) fn default_centre(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> 
     }
     // Onto the others along what their normals have beside those before.
     for (place, normal) in planes.into_iter().filter(|(_, normal)| axis_of(*normal).is_none()) {
-        let mut rest = normal;
-        for direction in &directions {
-            let along = dot(rest, *direction);
-            (0..3).for_each(|d| rest[d] -= along * direction[d]);
-        }
+        let rest = beside(&directions, normal);
         let length = norm(rest);
         if length > INDEPENDENT {
             let way = dot(normal, sub(place, centre)) / (length * length);

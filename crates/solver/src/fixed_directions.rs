@@ -84,11 +84,11 @@ pub(crate) fn fixed_directions(faces: &[(Fix, Point)]) -> FixedDirections {
             }
         }
         match fix {
-            Fix::Normal => extend(&mut basis, normal),
+            Fix::Normal => extend(&mut basis, normal, DEPENDENT),
             Fix::Tangential => {
                 let (first, second) = tangents(normal);
-                extend(&mut basis, first);
-                extend(&mut basis, second);
+                extend(&mut basis, first, DEPENDENT);
+                extend(&mut basis, second, DEPENDENT);
             }
         }
     }
@@ -109,7 +109,7 @@ fn smooth_surfaces(faces: &[(Fix, Point)]) -> Vec<(Fix, Point)> {
     sums.into_iter().map(|(fix, sum)| (fix, unit(sum))).collect()
 }
 
-fn unit(v: Point) -> Point {
+pub(crate) fn unit(v: Point) -> Point {
     let length = norm(v);
     v.map(|c| c / length)
 }
@@ -120,7 +120,7 @@ pub(crate) fn axis_of(normal: Point) -> Option<usize> {
 }
 
 /// Two unit vectors at right angles to a unit normal and to each other; coordinate axes where the normal is one.
-fn tangents(normal: Point) -> (Point, Point) {
+pub(crate) fn tangents(normal: Point) -> (Point, Point) {
     let least = (0..3).fold(0, |best, d| if normal[d].abs() < normal[best].abs() { d } else { best });
     let start = Frame::COORDINATES.axes[least];
     let part = dot(start, normal);
@@ -128,14 +128,18 @@ fn tangents(normal: Point) -> (Point, Point) {
     (first, cross(normal, first))
 }
 
-/// Adds what a unit vector brings to an orthonormal set.
-fn extend(basis: &mut Vec<Point>, vector: Point) {
-    let mut rest = vector;
-    for b in basis.iter() {
-        let part = dot(*b, rest);
-        rest = std::array::from_fn(|d| rest[d] - part * b[d]);
-    }
-    if norm(rest) > DEPENDENT {
+/// What a vector has beside orthonormal directions.
+pub(crate) fn beside(directions: &[Point], vector: Point) -> Point {
+    directions.iter().fold(vector, |rest, direction| {
+        let along = dot(*direction, rest);
+        std::array::from_fn(|d| rest[d] - along * direction[d])
+    })
+}
+
+/// Adds what a unit vector has beside an orthonormal set, where that is longer than `least` [1].
+pub(crate) fn extend(basis: &mut Vec<Point>, vector: Point, least: f64) {
+    let rest = beside(basis, vector);
+    if norm(rest) > least {
         basis.push(unit(rest));
     }
 }

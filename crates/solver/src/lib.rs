@@ -8,7 +8,6 @@
 //! crates' business.
 
 pub mod adjoint;
-mod amplitude;
 pub mod audit;
 pub mod bh;
 pub mod boundary;
@@ -34,6 +33,7 @@ pub mod material;
 pub mod model;
 pub mod multipole;
 pub mod newton;
+mod newton_harmonic;
 mod newton_steps;
 mod nonlinear;
 pub mod open;

@@ -80,7 +80,7 @@ pub(crate) fn energy(curve: &BhCurve, b: Complex3) -> OfFlux {
 }
 
 /// `H(B_u) − ν_r B_u` and `(∂H/∂B − ν_r) B_l`, from `B_l` and `B_u`: what the shape derivative takes. Of phasors the second has the
-/// derivative's adjoint, as `crate::amplitude` says.
+/// derivative's adjoint, as `crate::newton_harmonic` says.
 pub(crate) fn response(curve: &BhCurve, linear: f64, l: Complex3, u: Complex3) -> [Complex3; 2] {
     let law = curve.phasor(u);
     let less = |h: Complex3, b: Complex3| std::array::from_fn(|d| h[d] - linear * b[d]);

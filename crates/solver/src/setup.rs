@@ -34,8 +34,8 @@ pub struct FieldModelSetup {
     pub materials: Vec<Material>,
     /// `B_r` [T] of every region, by `RegionId`; shorter where the rest has none. Statics only.
     pub remanence: Vec<Point>,
-    /// B–H law of every region, by `RegionId`; shorter where the rest is linear. Above 0 Hz it is that of the amplitude. The
-    /// permeability of the region's material is then that of the penalty of nodal elements.
+    /// B–H law of every region, by `RegionId`; shorter where the rest is linear. Above 0 Hz it holds at the largest and the least
+    /// `|B|` of a period. The permeability of the region's material is then that of the penalty of nodal elements.
     pub bh: Vec<Option<Arc<BhCurve>>>,
     /// Conductors replaced by their surfaces.
     pub conductors: Vec<Conductor>,

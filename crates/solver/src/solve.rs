@@ -3,12 +3,12 @@
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 
-use crate::amplitude;
 use crate::circuit::Excitation;
 use crate::error::SolverError;
 use crate::linear::{LinearSolverCache, Method, PreparedSystem};
 use crate::model::FieldModel;
 use crate::newton::{self, NewtonObserver};
+use crate::newton_harmonic;
 use crate::newton_steps::StepSystems;
 use crate::solution::FieldSolution;
 
@@ -43,7 +43,7 @@ impl FieldModel {
         observer: &mut NewtonObserver<'_>,
     ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
         assert!(!self.is_linear(), "a model with B–H laws");
-        let solve = if self.angular_frequency() > 0.0 { amplitude::solve } else { newton::solve };
+        let solve = if self.angular_frequency() > 0.0 { newton_harmonic::solve } else { newton::solve };
         let (mut systems, mut start) = (StepSystems::new(self, cache), start);
         loop {
             match solve(self, mesh, (&mut systems, start), observer) {

@@ -3,11 +3,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::{Point, dot, sub};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 use fluxmorph_solver::element::Complex3;
-use fluxmorph_solver::recovery::probe;
-use fluxmorph_solver::{Boundary, ElementFamily, FieldModelSetup, Material, Order, UniformField};
+use fluxmorph_solver::recovery::{RecoveredPoint, probe};
+use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, Order, UniformField};
 
 use crate::{ALL, OUTSIDE, lines, painted, solved};
 
@@ -17,7 +18,7 @@ fn half() -> Mesh {
     painted([lines(4, 0.01), lines(6, 0.01), lines(4, 0.01)], &["air", "block"], block)
 }
 
-/// A magnetic block in a field along z; all sides are given it that are in `applied`.
+/// A magnetic block in a field along z that is given on the sides in `applied`, at rest.
 fn setup((family, order): (ElementFamily, Order), parallel: &[&str], applied: &[&str]) -> FieldModelSetup {
     let block = Material { relative_permeability: 4.0, conductivity: 0.0 };
     let field = Boundary::UniformField(UniformField { flux_density: [0.0, 0.0, 1.0], centre: None });
@@ -86,22 +87,55 @@ fn doubled(half: &Mesh, axis: usize) -> Mesh {
     Mesh::new(Arc::new(all), points).expect("a mesh")
 }
 
-/// At a flux-parallel plane, and at a flux-normal one.
+/// At a flux-parallel plane, and at a flux-normal one: with a block that is magnetic, one that eddy currents flow in, and a magnet
+/// of which the image is itself.
 #[test]
 fn half_of_a_device_has_the_values_of_the_whole_at_every_point() {
     let half = half();
     let wholes =
         [(doubled(&half, 0), &[][..], &OUTSIDE[..4]), (doubled(&half, 2), &["x_min"][..], &HALF[..])];
-    for elements in ALL {
-        let part = recovered(&half, setup(elements, &["x_min"], &HALF), &POINTS);
+    let magnetic = |_: &mut FieldModelSetup| ();
+    let conducting = |setup: &mut FieldModelSetup| {
+        // A skin of 8 mm.
+        (setup.frequency, setup.materials[1].conductivity) = (1000.0, 1e6);
+    };
+    let magnet = |setup: &mut FieldModelSetup| setup.remanence = vec![[0.0; 3], [0.0, 0.0, 1.5]];
+    let blocks: [&dyn Fn(&mut FieldModelSetup); 3] = [&magnetic, &conducting, &magnet];
+    for (elements, (kind, with_block)) in ALL.into_iter().flat_map(|e| (0..).zip(blocks).map(move |b| (e, b)))
+    {
+        let values = |mesh: &Mesh, parallel: &[&str], applied: &[&str]| {
+            let mut setup = setup(elements, parallel, applied);
+            with_block(&mut setup);
+            recovered(mesh, setup, &POINTS)
+        };
+        let part = values(&half, &["x_min"], &HALF);
         for (axis, (whole, parallel, applied)) in wholes.iter().enumerate() {
-            let all = recovered(whole, setup(elements, parallel, applied), &POINTS);
+            let all = values(whole, parallel, applied);
             for ((part, all), place) in part.iter().zip(&all).zip(POINTS) {
                 let off = (0..3).map(|d| (part[d] - all[d]).norm()).fold(0.0, f64::max);
                 // Fields of order 1, by solutions to 1e-11.
-                assert!(off < 1e-8, "{elements:?} {axis} {place:?}: {part:?} {all:?}");
+                assert!(off < 1e-8, "{elements:?} {kind} {axis} {place:?}: {part:?} {all:?}");
             }
         }
+    }
+}
+
+/// The image of a magnet that points across a flux-parallel plane would point back: a patch in it ends there, as at a natural face.
+#[test]
+fn a_magnet_across_a_plane_has_no_image() {
+    let half = half();
+    let in_the_block = [0.0, 0.031, 0.003];
+    let (e, _) = locate(&half, &[in_the_block])[0].expect("a point of the block");
+    for elements in ALL {
+        let weights = |remanence: Point, parallel: &[&str]| {
+            let mut setup = setup(elements, parallel, &HALF);
+            setup.remanence = vec![[0.0; 3], remanence];
+            let model = FieldModel::new(&half, setup).expect("a sound problem");
+            format!("{:?}", RecoveredPoint::new(&model, &half, e, in_the_block))
+        };
+        let alone = weights([1.5, 0.0, 0.0], &["x_min"]);
+        assert_eq!(alone, weights([1.5, 0.0, 0.0], &[]), "{elements:?}");
+        assert_ne!(alone, weights([0.0, 0.0, 1.5], &["x_min"]), "{elements:?}");
     }
 }
 

@@ -13,6 +13,7 @@ use fluxmorph_geometry::tet4::{Point, cross, dot, norm};
 
 use super::{BhCurve, Tangent};
 use crate::element::Complex3;
+use crate::fixed_directions::tangents;
 
 /// `|B·B|` over `BᴴB` below which the field turns in a circle, whose axes may be any.
 const ROUND: f64 = 1e-13;
@@ -58,13 +59,6 @@ pub fn peak(b: Complex3) -> f64 {
     (0.5 * (all + square(b).norm())).sqrt()
 }
 
-/// A unit vector across another one.
-fn any_across(unit: Point) -> Point {
-    let least = (0..3).fold(0, |best, d| if unit[d].abs() < unit[best].abs() { d } else { best });
-    let vector = cross(unit, std::array::from_fn(|d| f64::from(u8::from(d == least))));
-    vector.map(|c| c / norm(vector))
-}
-
 impl PhasorLaw {
     pub(super) fn new(curve: &BhCurve, b: Complex3) -> Self {
         let (square, all) = (square(b), b.iter().map(|c| c.norm_sqr()).sum::<f64>());
@@ -76,7 +70,7 @@ impl PhasorLaw {
         // At right angles but for rounding.
         let rest: Point = std::array::from_fn(|d| q[d] - dot(q, first) * first[d]);
         let c = norm(rest).min(a);
-        let second = if c > LINEAR * a { rest.map(|x| x / norm(rest)) } else { any_across(first) };
+        let second = if c > LINEAR * a { rest.map(|x| x / norm(rest)) } else { tangents(first).0 };
         let [at_a, at_c] = [a, c].map(|size| curve.at(size));
         let reluctivities = [curve.reluctivity(a, at_a), curve.reluctivity(c, at_c)];
         let difference = if a - c > CLOSE * a {

@@ -3,12 +3,12 @@
 //! A rigid virtual velocity `v` of the body's nodes, zero at all others, deforms the elements that touch the body from outside.
 //! The force is minus the rate at which their field energy changes at fixed potentials ([`crate::element::virtual_work`]); inside
 //! the body nothing is deformed. Where the body goes on beyond a conditioned plane, its nodes there keep to the plane, so that a
-//! force is that on the free faces of the meshed part. The same number is the stress `∫σ:∇v` over the layer, which holds with eddy currents as well:
-//! in harmonics it is the time average. The layer must be without current, magnetisation and conductivity.
+//! force is that on the free faces of the meshed part. The same number is the stress `∫σ:∇v` over the layer, which holds with
+//! eddy currents as well: in harmonics it is the time average. The layer must be without current, magnetisation and conductivity.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, cross, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
@@ -16,6 +16,7 @@ use super::integral::Sum;
 use super::{FunctionalValue, is_static};
 use crate::coil::CoilShape;
 use crate::error::SolverError;
+use crate::fixed_directions::{beside, extend};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 
@@ -84,7 +85,7 @@ impl Force {
         let of_body = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
         let mut body: BTreeMap<NodeId, Vec<Point>> = of_body.map(|node| (node, Vec::new())).collect();
         for (node, normal) in conditioned(model) {
-            body.entry(node).and_modify(|held| hold(held, normal));
+            body.entry(node).and_modify(|held| extend(held, normal, INDEPENDENT));
         }
         let around = body.keys().flat_map(|&node| topology.elements_around(node)).copied();
         let layer: BTreeSet<ElementId> = around.filter(|e| !inside(e)).collect();
@@ -137,7 +138,7 @@ impl Force {
             for (node, term) in topology.tet(e).into_iter().zip(terms) {
                 let Some(held) = self.body.get(&node) else { continue };
                 let sum: &mut Point = sums.entry(node).or_default();
-                let free = without(held, *term);
+                let free = beside(held, *term);
                 (0..3).for_each(|d| sum[d] -= free[d]);
             }
         }
@@ -158,7 +159,7 @@ impl Force {
     ) -> FunctionalValue {
         let space = model.space();
         let free =
-            |node: NodeId, vector: Point| self.body.get(&node).map_or([0.0; 3], |held| without(held, vector));
+            |node: NodeId, vector: Point| self.body.get(&node).map_or([0.0; 3], |held| beside(held, vector));
         let mut sum = Sum::new(model);
         sum.elements(&self.layer, |e| {
             let nodes = model.topology().tet(e);
@@ -194,23 +195,6 @@ fn conditioned(model: &FieldModel) -> impl Iterator<Item = (NodeId, Point)> + '_
 /// What a normal must have beside directions that are held [1] to be another one, and not of a face of the same surface, which may
 /// be curved: the sine of 17 degrees.
 const INDEPENDENT: f64 = 0.3;
-
-/// Adds to some directions what a normal has beside them.
-fn hold(held: &mut Vec<Point>, normal: Point) {
-    let rest = without(held, normal);
-    let length = norm(rest);
-    if length > INDEPENDENT {
-        held.push(rest.map(|c| c / length));
-    }
-}
-
-/// What a vector has beside some directions.
-fn without(held: &[Point], vector: Point) -> Point {
-    held.iter().fold(vector, |rest, direction| {
-        let along = dot(rest, *direction);
-        std::array::from_fn(|d| rest[d] - along * direction[d])
-    })
-}
 
 /// Whether the current of a coil flows in an element.
 fn carries_current(model: &FieldModel, mesh: &Mesh, e: ElementId) -> bool {

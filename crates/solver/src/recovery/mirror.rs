@@ -11,11 +11,15 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
 
 use crate::boundary::Boundary;
+use crate::fixed_directions::{beside, unit};
 use crate::model::FieldModel;
 
 /// Sine of an angle up to which directions count as one, and share of the way to a point by which it may lie off a plane: faces
 /// of a fine mesh with coordinates of six digits have directions of their own.
 const ROUNDING: f64 = 1e-3;
+
+/// Layers of elements around the start of a patch after which no fit is tried.
+const LAYERS_LIMIT: usize = 3;
 
 /// The outer faces of a model with what makes an image there, by node.
 #[derive(Clone, Debug, Default)]
@@ -96,8 +100,7 @@ impl Walls {
         let mut planes: Vec<Plane> = Vec::new();
         for &(_, face, condition) in at_node {
             let area = area_vector(face.map(|n| mesh.point(n)));
-            let normal = area.map(|c| c / norm(area));
-            let plane = Plane { place: mesh.point(node), normal, condition };
+            let plane = Plane { place: mesh.point(node), normal: unit(area), condition };
             if let Some(known) = planes.iter_mut().find(|known| known.is_parallel(&plane)) {
                 known.condition = if known.condition == condition { condition } else { Condition::Other };
             } else if planes.iter().all(|known| known.is_square_to(&plane)) {
@@ -115,9 +118,7 @@ impl Walls {
 
 impl Plane {
     fn is_parallel(&self, other: &Self) -> bool {
-        let along = dot(self.normal, other.normal);
-        let rest: Point = std::array::from_fn(|d| other.normal[d] - along * self.normal[d]);
-        norm(rest) <= ROUNDING
+        norm(beside(&[self.normal], other.normal)) <= ROUNDING
     }
 
     fn is_square_to(&self, other: &Self) -> bool {
@@ -158,13 +159,9 @@ impl Plane {
     }
 
     /// The same, at right angles to others to the last digit: reflections then commute.
-    fn squared_to(mut self, others: &[Self]) -> Self {
-        for other in others {
-            let along = dot(other.normal, self.normal);
-            (0..3).for_each(|d| self.normal[d] -= along * other.normal[d]);
-        }
-        let length = norm(self.normal);
-        Self { normal: self.normal.map(|c| c / length), ..self }
+    fn squared_to(self, others: &[Self]) -> Self {
+        let normals: Vec<Point> = others.iter().map(|other| other.normal).collect();
+        Self { normal: unit(beside(&normals, self.normal)), ..self }
     }
 }
 
@@ -180,14 +177,14 @@ impl Mirrors {
         for plane in model.walls().at(model.topology(), mesh, node) {
             let change = norm(sub(plane.turn(self.remanence), self.remanence));
             if plane.condition == Condition::Other || change > ROUNDING * norm(self.remanence) {
-                self.refused.push(plane);
+                self.refuse(plane);
                 continue;
             }
             let known = self.planes.iter().position(|known| known.lies_in(&plane));
             if let Some(k) = known.filter(|&k| self.planes[k].condition == plane.condition) {
                 image |= 1 << k;
             } else if known.is_some() {
-                self.refused.push(plane);
+                self.refuse(plane);
             } else if !self.refused.iter().any(|refused| refused.lies_in(&plane))
                 && self.planes.iter().all(|known| known.is_square_to(&plane))
             {
@@ -197,6 +194,36 @@ impl Mirrors {
             }
         }
         image
+    }
+
+    fn refuse(&mut self, plane: Plane) {
+        if !self.refused.iter().any(|refused| refused.lies_in(&plane)) {
+            self.refused.push(plane);
+        }
+    }
+
+    /// What can be fitted to the smallest patch that determines it: that at the start, or with layers of elements around it; `None`
+    /// after [`LAYERS_LIMIT`]. Planes that are given up on the way leave it to start anew, without their images.
+    pub(super) fn fit<T>(
+        &mut self,
+        (model, mesh): (&FieldModel, &Mesh),
+        counts: &impl Fn(ElementId) -> bool,
+        start: impl Fn(&mut Self) -> BTreeSet<(Image, ElementId)>,
+        fitted: impl Fn(&BTreeSet<(Image, ElementId)>, &Self) -> Option<T>,
+    ) -> Option<T> {
+        let (mut members, mut layers) = (start(self), 1);
+        loop {
+            if self.give_up_crossed(mesh, &members) {
+                (members, layers) = (start(self), 1);
+                continue;
+            }
+            let found = fitted(&members, self);
+            if found.is_some() || layers == LAYERS_LIMIT {
+                return found;
+            }
+            members = self.around((model, mesh), &members, counts);
+            layers += 1;
+        }
     }
 
     /// Some elements, each itself or an image, with all those that share a vertex with one of them and count.
@@ -232,7 +259,7 @@ impl Mirrors {
 
     /// Gives up the planes that some elements are on both sides of, as beside an edge at which the domain is re-entrant, and those in
     /// which a node has faces of another condition. Whether there was one.
-    pub(super) fn give_up_crossed(&mut self, mesh: &Mesh, members: &BTreeSet<(Image, ElementId)>) -> bool {
+    fn give_up_crossed(&mut self, mesh: &Mesh, members: &BTreeSet<(Image, ElementId)>) -> bool {
         let is_given_up = |plane: &Plane| {
             let own = members.iter().filter(|(image, _)| *image == 0);
             self.refused.iter().any(|refused| refused.lies_in(plane))

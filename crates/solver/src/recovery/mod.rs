@@ -39,9 +39,6 @@ pub(crate) use mirror::Walls;
 use mirror::{Image, Mirrors};
 pub(crate) use places::{BlendedField, FixedPlaces};
 
-/// Layers of elements around the probed one after which no fit is tried.
-const LAYERS_LIMIT: usize = 3;
-
 /// How fast the weight of a node falls, and that of a point within an element ([`Fit::new`]): most nodes lie on the rim of a patch,
 /// and where it lies to one side of the point, values of `B` far from it keep a fit from swinging there. Of the values from
 /// 0.2 to 1.5 the best around a sphere in a field, on the axes of coils, behind the paper's plate and at the end of a mesh.
@@ -83,26 +80,19 @@ impl RecoveredPoint {
     pub fn new(model: &FieldModel, mesh: &Mesh, element: ElementId, point: Point) -> Self {
         let is_alike = has_the_material_of(model, element);
         let mut mirrors = Mirrors::new(model, element);
-        let mut members = BTreeSet::from([(0, element)]);
-        let mut layers = 0;
-        while layers < LAYERS_LIMIT {
-            members = mirrors.around((model, mesh), &members, &is_alike);
-            layers += 1;
-            if mirrors.give_up_crossed(mesh, &members) {
-                (members, layers) = (BTreeSet::from([(0, element)]), 0);
-                continue;
-            }
-            let patch = (&members, &mirrors);
+        let own = BTreeSet::from([(0, element)]);
+        let start = |mirrors: &mut Mirrors| mirrors.around((model, mesh), &own, &is_alike);
+        let fitted = |members: &BTreeSet<(Image, ElementId)>, mirrors: &Mirrors| {
             let images = match model.space().family() {
-                ElementFamily::Nodal => of_potentials(model, mesh, patch, (element, point)),
-                ElementFamily::Edge => of_flux_densities(model, mesh, patch, point),
+                ElementFamily::Nodal => of_potentials(model, mesh, (members, mirrors), (element, point)),
+                ElementFamily::Edge => of_flux_densities(model, mesh, (members, mirrors), point),
             };
-            if let Some(images) = images {
-                return Self { elements: members.into_iter().map(|(_, e)| e).collect(), images };
-            }
-        }
-        let own = Weights::FluxDensities(vec![(element, [0.25; 4], 1.0)]);
-        Self { elements: BTreeSet::from([element]), images: vec![(mirrors.turn(0), own)] }
+            Some(Self { elements: members.iter().map(|(_, e)| *e).collect(), images: images? })
+        };
+        mirrors.fit((model, mesh), &is_alike, start, fitted).unwrap_or_else(|| {
+            let mean = Weights::FluxDensities(vec![(element, [0.25; 4], 1.0)]);
+            Self { elements: BTreeSet::from([element]), images: vec![(mirrors.turn(0), mean)] }
+        })
     }
 
     /// The elements that take part, ascending.

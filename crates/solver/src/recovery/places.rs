@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::fit::Fit;
 use super::mirror::{Image, Mirrors};
-use super::{LAYERS_LIMIT, has_the_material_of, samples_in, scatter_flux, superconvergent, turned};
+use super::{has_the_material_of, samples_in, scatter_flux, superconvergent, turned};
 use crate::element::quadrature::Node;
 use crate::element::{Complex3, dot3};
 use crate::error::SolverError;
@@ -148,8 +148,6 @@ impl FixedPlaces {
         let order = model.space().order();
         let is_alike = has_the_material_of(model, element);
         let start = (model, &self.start);
-        let mut mirrors = Mirrors::new(model, element);
-        let mut members = mirrors.around_node(start, vertex, &is_alike);
         let fitted = |members: &BTreeSet<(Image, ElementId)>, mirrors: &Mirrors, degree| {
             let samples = samples_in(order, members);
             Fit::even(degree, &offsets(&self.start, mirrors, &samples, self.start.point(vertex)))?;
@@ -157,21 +155,13 @@ impl FixedPlaces {
             let (members, mirrors) = (members.iter().copied().collect(), mirrors.clone());
             Some(Patch { members, mirrors, weights: fit.value(), fit })
         };
-        let mut layers = 0;
-        while layers < LAYERS_LIMIT {
-            if mirrors.give_up_crossed(&self.start, &members) {
-                (members, layers) = (mirrors.around_node(start, vertex, &is_alike), 0);
-                continue;
-            }
-            if let Some(patch) = fitted(&members, &mirrors, order.degree()) {
-                return patch;
-            }
-            members = mirrors.around(start, &members, &is_alike);
-            layers += 1;
-        }
+        let mut mirrors = Mirrors::new(model, element);
+        let around = |mirrors: &mut Mirrors| mirrors.around_node(start, vertex, &is_alike);
+        let patch = mirrors
+            .fit(start, &is_alike, around, |members, mirrors| fitted(members, mirrors, order.degree()));
         // In a part too small for any fit, the mean of its own.
-        let mean = fitted(&BTreeSet::from([(0, element)]), &mirrors, 0);
-        mean.expect("one value determines a constant")
+        let mean = || fitted(&BTreeSet::from([(0, element)]), &mirrors, 0);
+        patch.or_else(mean).expect("one value determines a constant")
     }
 }
 
@@ -223,10 +213,10 @@ impl BlendedField<'_> {
                 let own = q.map(|c| lambda * c);
                 let along: Vec<c64> = values.iter().map(|b| dot3(own, *b)).collect();
                 let by_points = patch.fit.value_by_points(&patch.weights, &along);
-                for (((image, place), weight), by_point) in
+                for (((image, turn, place), weight), by_point) in
                     self.samples.places_of(patch).zip(&patch.weights).zip(by_points)
                 {
-                    let own = turned(&patch.mirrors.turn(image), own);
+                    let own = turned(&turn, own);
                     (0..3).for_each(|d| by_samples[place][d] += *weight * own[d]);
                     let (e, lambda) = self.samples.at(place);
                     let by_point = patch.mirrors.direction(image, by_point.map(|c| c.re));
@@ -266,18 +256,20 @@ impl Samples {
         (self.elements[place / count], &self.rule[place % count].0)
     }
 
-    /// The samples of a patch, each itself or an image.
-    fn places_of<'p>(&'p self, patch: &'p Patch) -> impl Iterator<Item = (Image, usize)> + 'p {
+    /// The samples of a patch, each itself or an image, with what turns B there.
+    fn places_of<'p>(&'p self, patch: &'p Patch) -> impl Iterator<Item = (Image, [Point; 3], usize)> + 'p {
         let count = self.rule.len();
-        let first =
-            move |e: &ElementId| self.elements.binary_search(e).expect("elements of all patches") * count;
-        patch.members.iter().flat_map(move |(image, e)| (0..count).map(move |k| (*image, first(e) + k)))
+        let of_member = move |&(image, e): &(Image, ElementId)| {
+            let first = self.elements.binary_search(&e).expect("elements of all patches") * count;
+            let turn = patch.mirrors.turn(image);
+            (first..first + count).map(move |place| (image, turn, place))
+        };
+        patch.members.iter().flat_map(of_member)
     }
 
     /// `B` [T] at them.
     fn of(&self, patch: &Patch) -> Vec<Complex3> {
-        let at = |(image, place): (Image, usize)| turned(&patch.mirrors.turn(image), self.values[place]);
-        self.places_of(patch).map(at).collect()
+        self.places_of(patch).map(|(_, turn, place)| turned(&turn, self.values[place])).collect()
     }
 }
 

@@ -75,7 +75,7 @@ impl PointLaw {
 
 /// The derivative of the field's equations in one state.
 #[derive(Debug)]
-pub(crate) struct AmplitudeTangent {
+pub(crate) struct HarmonicTangent {
     model: FieldModel,
     mesh: Mesh,
     /// Of the linear parts.
@@ -84,7 +84,7 @@ pub(crate) struct AmplitudeTangent {
     points: Vec<[Option<PointLaw>; MOST_POINTS]>,
 }
 
-impl AmplitudeTangent {
+impl HarmonicTangent {
     /// The derivative along some unknowns.
     fn apply(&self, side: Side, x: &[c64]) -> Vec<c64> {
         let mut y = vec![c64::default(); x.len()];
@@ -127,7 +127,7 @@ impl AmplitudeTangent {
     }
 }
 
-impl RealLinear for AmplitudeTangent {
+impl RealLinear for HarmonicTangent {
     fn solve_adjoint(
         &self,
         right_side: &[c64],
@@ -217,7 +217,7 @@ impl Problem<'_> {
     }
 
     /// The derivative at some unknowns.
-    fn tangent(&self, values: &[c64]) -> AmplitudeTangent {
+    fn tangent(&self, values: &[c64]) -> HarmonicTangent {
         let (space, model) = (self.model.space(), self.model);
         let state = FieldSolution::of_state(values.to_vec());
         let of_element = |&e: &_| {
@@ -237,12 +237,7 @@ impl Problem<'_> {
             points
         };
         let points = model.elements_with_a_law().par_iter().map(of_element).collect();
-        AmplitudeTangent {
-            model: model.clone(),
-            mesh: self.mesh.clone(),
-            matrix: self.matrix.clone(),
-            points,
-        }
+        HarmonicTangent { model: model.clone(), mesh: self.mesh.clone(), matrix: self.matrix.clone(), points }
     }
 
     /// A length of a step that lowers the residual, first the one at which it has next to no part along the step: a new iterate with
