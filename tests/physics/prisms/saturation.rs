@@ -54,7 +54,8 @@ pub(super) fn driven(prism: Prism, ampere_turns: f64) -> Prism {
     Prism { source: Source { ampere_turns, ..prism.source }, ..prism }
 }
 
-/// Edge elements of both orders have these forces and torques on a part within 1 %.
+/// Edge elements of both orders have these forces and torques on a part within 1 %, nodal ones of second order within 2 %; those of
+/// first order are not at home beside iron and conductors.
 fn assert_forces(
     prism: &Prism,
     part: &str,
@@ -62,7 +63,9 @@ fn assert_forces(
     expected: impl IntoIterator<Item = (RigidMotion, f64)> + Clone,
 ) {
     let mesh = boxed(prism, Cells::COARSE);
-    for discretisation in ALL.into_iter().filter(|d| d.name.starts_with("edge")) {
+    let at_home = ALL.into_iter().filter(|discretisation| discretisation.name != "nodal 1");
+    for discretisation in at_home {
+        let within = if discretisation.name == "nodal 2" { 0.02 } else { 0.01 };
         let (mesh, mut setup) = set_up(prism, &mesh, 1.0);
         let body = mesh.topology().region(part).expect("it is named");
         setup.bh = vec![None; body.index()];
@@ -73,7 +76,7 @@ fn assert_forces(
             let force = Functional::force(&model, &mesh, part, &[body], motion).expect("a layer of air");
             let found = force.evaluate(&model, &mesh, &solution).expect("finite").value;
             println!("{}: {found:e}, exact {exact:e}", discretisation.name);
-            assert!((found / exact - 1.0).abs() < 0.01, "{}: {found} against {exact}", discretisation.name);
+            assert!((found / exact - 1.0).abs() < within, "{}: {found} against {exact}", discretisation.name);
         }
     }
 }

@@ -10,7 +10,7 @@
 //! order, [`interface`] the triangles, [`impedance`] the Leontovich surface with `ψ` on it; [`lagrange`], [`quadrature`] and
 //! [`tabulated`] what they are made from; [`point`] the field at a point, the loads, and the derivative with respect to the node positions;
 //! [`tensor`] what reluctivities that are tensors add to the matrix; [`density`] integrals of energy and loss with their
-//! derivatives; [`virtual_work`] forces; `edge` all of that for edge elements.
+//! derivatives; `virtual_work` forces; `edge` all of that for edge elements.
 
 pub mod density;
 #[cfg(test)]
@@ -25,7 +25,7 @@ pub mod quadrature;
 pub mod tabulated;
 pub mod tensor;
 mod triangle;
-pub mod virtual_work;
+pub(crate) mod virtual_work;
 pub mod volume;
 
 use fluxmorph_geometry::fem::c64;

@@ -1,41 +1,22 @@
-//! The rate at which the field energy of an element changes as its vertices move, and the derivatives of that rate: what a
-//! force is made of.
+//! The work of Maxwell's stress along a virtual motion of the vertices of an element, and its derivatives: what a force is made of.
 //!
-//! With the density `f(F)` of the point values `F` (of nodal elements `F_ij = ∂_i A_j`, of edge elements `B`), which follow a
-//! displacement with the gradient `M_di = ∂_i u_d` by `δF = T(M) F` at fixed coefficients, a virtual velocity with the gradient
-//! `L` changes the energy at the rate `s = V ⟨S:L⟩`, `S = f I + adj(f', F)`, where `adj(P, F):M = P·T(M)F`. As `L` itself
-//! changes by `−L M`, a further displacement changes the rate by `V ⟨Q:M⟩`,
+//! With the energy density `c |B|²` the stress is `S = 2c Re(B̄ Bᵀ) − c |B|² I`. It is also the rate at which the energy changes as
+//! the vertices move and carry the flux with them, `δB = (L − tr L) B` for a velocity `v` with the gradient `L_di = ∂_i v_d`; edge
+//! elements do so at fixed coefficients (Coulomb, IEEE Trans. Magn. 19 (1983) 2514). Nodal elements at fixed potentials do not: their
+//! energy changes by a tensor that is off by one without divergence, `ε_ijk H_k ∂_j A_d`, so that forces are right, but not torques,
+//! for the potentials within a body that turns would have to turn with it, nor what acts on part of a surface. So `B` is carried in
+//! both families.
 //!
-//! `Q = (S:L) I + adj(∂_F (S:L), F) − Lᵀ S`.
-//!
-//! Coulomb, IEEE Trans. Magn. 19 (1983) 2514, has the rate.
+//! As the vertices move by a displacement with the gradient `M`, `L` itself changes by `−L M`, and the work `s = V ⟨S:L⟩` by that of a
+//! density of `B`, less `V ⟨Lᵀ S⟩:M`.
 
-use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, Tet4};
 
 use super::Complex3;
-use super::density::ElementIntegral;
-use super::lagrange::Lagrange;
-use super::point::PointField;
-use super::tabulated::Rule;
-use super::volume::NodalField;
-
-/// A rate and its derivatives.
-#[derive(Clone, Copy, Debug)]
-pub struct VirtualWork<const N: usize> {
-    /// `s`, with its derivatives.
-    pub rate: ElementIntegral<N, 4>,
-    /// By the velocities of the vertices, shape `(4, 3)`: the derivative of the energy by their positions.
-    pub by_velocity: [Point; 4],
-}
+use super::density::OfFlux;
 
 /// A tensor with the index `[d][i]`.
 pub(super) type Tensor = [Point; 3];
-
-/// `L_di = ∂_i v_d` of the velocities of the vertices.
-pub(super) fn velocity_gradient(tet: &Tet4, velocities: &[Point; 4]) -> Tensor {
-    tensor(|d, i| (0..4).map(|k| velocities[k][d] * tet.gradients[k][i]).sum())
-}
 
 /// The tensor with some entries.
 #[inline]
@@ -43,125 +24,125 @@ pub(super) fn tensor(entry: impl Fn(usize, usize) -> f64) -> Tensor {
     std::array::from_fn(|d| std::array::from_fn(|i| entry(d, i)))
 }
 
-/// `S:L` and `Q` from `S`, `L` and `adj(∂_F (S:L), F)`.
-pub(super) fn second(stress: &Tensor, velocity: &Tensor, adjoint: &Tensor) -> (f64, Tensor) {
-    let rate = (0..3).flat_map(|d| (0..3).map(move |i| stress[d][i] * velocity[d][i])).sum();
-    let turned = |d: usize, i: usize| (0..3).map(|e| velocity[e][d] * stress[e][i]).sum::<f64>();
-    (rate, tensor(|d, i| if d == i { rate } else { 0.0 } + adjoint[d][i] - turned(d, i)))
+/// The work in one element, by the points at which `B` is integrated.
+#[derive(Debug)]
+pub(crate) struct VirtualWork {
+    /// `c` [m/H].
+    factor: f64,
+    /// `L` [1/m per unit of the motion].
+    velocity: Tensor,
+    /// The stresses [N/m²] of all points so far.
+    sum: Tensor,
+    points: usize,
 }
 
-/// `V S ∇λ_k` for the four vertices.
-pub(super) fn at_vertices(tet: &Tet4, sum: &Tensor) -> [Point; 4] {
-    tet.gradients.map(|g| std::array::from_fn(|d| tet.volume * (0..3).map(|i| sum[d][i] * g[i]).sum::<f64>()))
-}
-
-/// Adds a share of a tensor.
-pub(super) fn add(sum: &mut Tensor, share: f64, term: &Tensor) {
-    for d in 0..3 {
-        for i in 0..3 {
-            sum[d][i] += share * term[d][i];
-        }
+impl VirtualWork {
+    /// Of velocities of the vertices.
+    pub(crate) fn new(tet: &Tet4, factor: f64, velocities: &[Point; 4]) -> Self {
+        let velocity = tensor(|d, i| (0..4).map(|k| velocities[k][d] * tet.gradients[k][i]).sum());
+        Self { factor, velocity, sum: [[0.0; 3]; 3], points: 0 }
     }
-}
 
-/// `∂_i A_j`, or derivatives by it.
-type Gradient = [Complex3; 3];
-
-/// Half the derivative of `f = c (|curl A|² + p |div A|²)` by `∂_i A_j`.
-fn half_derivative([factor, penalty]: [f64; 2], gradient: &Gradient) -> Gradient {
-    let divergence = penalty * (gradient[0][0] + gradient[1][1] + gradient[2][2]);
-    std::array::from_fn(|i| {
-        std::array::from_fn(|j| {
-            let by = if i == j { divergence } else { gradient[i][j] - gradient[j][i] };
-            factor * by.conj()
-        })
-    })
-}
-
-/// `adj(P, F)_di = −2 Re Σ_j P_ij ∂_d A_j`.
-fn adjoint(by: &Gradient, gradient: &Gradient) -> Tensor {
-    tensor(|d, i| -2.0 * (0..3).map(|j| (by[i][j] * gradient[d][j]).re).sum::<f64>())
-}
-
-/// The rate of `∫c (|curl A|² + p |div A|²)`, the energy with its penalty, for some velocities of the vertices.
-pub fn virtual_work<const N: usize>(
-    shape: &Lagrange<N, 4>,
-    tet: &Tet4,
-    law: [f64; 2],
-    velocities: &[Point; 4],
-    field: &NodalField<N>,
-) -> VirtualWork<N> {
-    let velocity = velocity_gradient(tet, velocities);
-    let trace = velocity[0][0] + velocity[1][1] + velocity[2][2];
-    let mut rate =
-        ElementIntegral { value: 0.0, potentials: [[c64::default(); 4]; N], positions: [[0.0; 3]; 4] };
-    let (mut stresses, mut sum) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
-    for at in shape.at(if N == 4 { Rule::Centroid } else { Rule::Degree2 }) {
-        let gradient = PointField::tabulated(at, tet, field).gradient;
-        let half = half_derivative(law, &gradient);
-        let density: f64 =
-            (0..3).map(|i| (0..3).map(|j| (half[i][j] * gradient[i][j]).re).sum::<f64>()).sum();
-        let of_stress = adjoint(&half, &gradient);
-        let stress = tensor(|d, i| if d == i { density } else { 0.0 } + of_stress[d][i]);
-        let carried: Gradient = std::array::from_fn(|i| {
-            std::array::from_fn(|j| (0..3).map(|d| velocity[d][i] * gradient[d][j]).sum())
-        });
-        let of_carried = half_derivative(law, &carried);
-        let by: Gradient = std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                let turned: c64 = (0..3).map(|e| velocity[i][e] * half[e][j]).sum();
-                trace * half[i][j] - turned - of_carried[i][j]
-            })
-        });
-        let (value, tensor) = second(&stress, &velocity, &adjoint(&by, &gradient));
-        let weight = at.share * tet.volume;
-        rate.value += weight * value;
-        for (a, potentials) in rate.potentials.iter_mut().enumerate() {
-            let slope = at.gradient(&tet.gradients, a);
-            for j in 0..3 {
-                potentials[j] += (0..3).map(|i| weight * slope[i] * by[i][j]).sum::<c64>();
+    /// The density `S:L`, and its derivative by `B`, halved as in [`super::density`], at the next point. All points count alike.
+    pub(crate) fn density(&mut self, b: Complex3) -> OfFlux {
+        let half = b.map(|c| self.factor * c.conj());
+        let density: f64 = (0..3).map(|d| (half[d] * b[d]).re).sum();
+        let stress = tensor(|d, i| 2.0 * (half[d] * b[i]).re - if d == i { density } else { 0.0 });
+        let (velocity, mut work) = (&self.velocity, 0.0);
+        for d in 0..3 {
+            for i in 0..3 {
+                self.sum[d][i] += stress[d][i];
+                work += stress[d][i] * velocity[d][i];
             }
         }
-        add(&mut stresses, at.share, &stress);
-        add(&mut sum, at.share, &tensor);
+        self.points += 1;
+        let trace = velocity[0][0] + velocity[1][1] + velocity[2][2];
+        let by_b = |d: usize| {
+            let both = |i: usize| half[i] * (velocity[d][i] + velocity[i][d]);
+            both(0) + both(1) + both(2) - half[d] * trace
+        };
+        (work, std::array::from_fn(by_b))
     }
-    rate.positions = at_vertices(tet, &sum);
-    VirtualWork { rate, by_velocity: at_vertices(tet, &stresses) }
+
+    /// After all points: what the derivatives by the positions of the vertices have beside those of the density, and the derivatives by
+    /// their velocities [N].
+    pub(crate) fn at_vertices(&self, tet: &Tet4) -> [[Point; 4]; 2] {
+        let share = tet.volume / self.points as f64;
+        let along = |tensor: &Tensor, g: Point| -> Point {
+            std::array::from_fn(|d| share * (0..3).map(|i| tensor[d][i] * g[i]).sum::<f64>())
+        };
+        let turned = tensor(|d, i| -(0..3).map(|e| self.velocity[e][d] * self.sum[e][i]).sum::<f64>());
+        [&turned, &self.sum].map(|tensor| tet.gradients.map(|g| along(tensor, g)))
+    }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::density::{flux_integral, squared_deviation};
+mod tests {
+    use fluxmorph_geometry::fem::c64;
+
+    use super::super::density::{ElementIntegral, flux_integral, squared_deviation};
     use super::super::differences::{SKEW, central_difference, derivatives_hold, values};
+    use super::super::edge::{Ascending, EdgeShape};
+    use super::super::lagrange::Lagrange;
+    use super::super::volume::NodalField;
     use super::*;
 
-    pub(in super::super) const VELOCITIES: [Point; 4] =
-        [[0.4, -0.2, 0.7], [0.1, 0.9, -0.5], [-0.3, 0.2, 0.6], [0.8, -0.7, 0.1]];
+    const VELOCITIES: [Point; 4] = [[0.4, -0.2, 0.7], [0.1, 0.9, -0.5], [-0.3, 0.2, 0.6], [0.8, -0.7, 0.1]];
 
-    /// The vertices after some time.
-    pub(in super::super) fn after(time: f64) -> [Point; 4] {
-        std::array::from_fn(|k| std::array::from_fn(|d| SKEW[k][d] + time * VELOCITIES[k][d]))
+    /// The work by an integral over `B`.
+    fn work<const N: usize>(
+        vertices: [Point; 4],
+        integral: impl FnOnce(&Tet4, &mut dyn FnMut(Complex3) -> OfFlux) -> ElementIntegral<N, 4>,
+    ) -> (ElementIntegral<N, 4>, [Point; 4]) {
+        let tet = Tet4::new(vertices);
+        let mut work = VirtualWork::new(&tet, 0.7, &VELOCITIES);
+        let mut rate = integral(&tet, &mut |b| work.density(b));
+        let [by_positions, by_velocities] = work.at_vertices(&tet);
+        for (position, more) in rate.positions.iter_mut().zip(by_positions) {
+            (0..3).for_each(|d| position[d] += more[d]);
+        }
+        (rate, by_velocities)
     }
 
-    fn check<const N: usize>(shape: &'static Lagrange<N, 4>) {
-        derivatives_hold::<N, 4>(SKEW, |x, u| {
-            virtual_work(shape, &Tet4::new(x), [0.7, 0.6], &VELOCITIES, &NodalField::new(u)).rate
+    fn check_derivatives<const N: usize>(
+        work: impl Fn([Point; 4], [[c64; 4]; N]) -> (ElementIntegral<N, 4>, [Point; 4]),
+    ) {
+        derivatives_hold::<N, 4>(SKEW, |x, u| work(x, u).0);
+        let (rate, by_velocities) = work(SKEW, values(5));
+        let along: f64 = (0..4).map(|k| fluxmorph_geometry::tet4::dot(by_velocities[k], VELOCITIES[k])).sum();
+        assert!((along - rate.value).abs() < 1e-12 * rate.value.abs(), "it is linear in the velocities");
+    }
+
+    fn of_nodal<const N: usize>(shape: &'static Lagrange<N, 4>) {
+        check_derivatives(|x, u| {
+            work(x, |tet, density| flux_integral(shape, tet, &NodalField::new(u), density))
         });
-        let field = NodalField::new(values(5));
-        let work = virtual_work(shape, &Tet4::new(SKEW), [0.7, 0.0], &VELOCITIES, &field);
-        let energy = |t: f64| {
-            flux_integral(shape, &Tet4::new(after(t)), &field, squared_deviation(0.7, [0.0; 3])).value.into()
+    }
+
+    fn of_edge<const N: usize, const M: usize>(shape: &'static EdgeShape<N, M>) {
+        let ascending = |tet: &Tet4| Ascending::new(tet, [1, 3, 0, 2]);
+        let of = |x, u: [[c64; 4]; N]| {
+            work(x, |tet, density| shape.flux_integral((tet, &ascending(tet)), &u, density))
         };
-        let difference = central_difference(1e-5, energy).re;
-        assert!((difference - work.rate.value).abs() < 1e-8, "{difference} {}", work.rate.value);
-        let along: f64 =
-            (0..4).map(|k| fluxmorph_geometry::tet4::dot(work.by_velocity[k], VELOCITIES[k])).sum();
-        assert!((along - work.rate.value).abs() < 1e-13, "the rate is linear in the velocities");
+        check_derivatives(of);
+        let field: [[c64; 4]; N] = values(5);
+        let energy = |t: f64| {
+            let moved = |k: usize| std::array::from_fn(|d| SKEW[k][d] + t * VELOCITIES[k][d]);
+            let tet = Tet4::new(std::array::from_fn(moved));
+            shape
+                .flux_integral((&tet, &ascending(&tet)), &field, squared_deviation(0.7, [0.0; 3]))
+                .value
+                .into()
+        };
+        let (rate, difference) = (of(SKEW, field).0.value, central_difference(1e-5, energy).re);
+        assert!((difference - rate).abs() < 1e-8 * (1.0 + rate.abs()), "{difference} {rate}");
     }
 
     #[test]
-    fn the_rate_is_the_derivative_of_the_energy_and_has_the_derivatives_of_differences() {
-        check(Lagrange::<4, 4>::tet());
-        check(Lagrange::<10, 4>::tet());
+    fn the_work_has_the_derivatives_of_differences_and_is_the_rate_of_the_energy_on_edge_elements() {
+        of_nodal(Lagrange::<4, 4>::tet());
+        of_nodal(Lagrange::<10, 4>::tet());
+        of_edge(EdgeShape::<6, 12>::tet());
+        of_edge(EdgeShape::<10, 30>::tet());
     }
 }

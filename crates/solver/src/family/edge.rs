@@ -121,16 +121,6 @@ impl<const N: usize, const M: usize, const F: usize, const K: usize> Family for 
         self.tet.flux_shape_derivative((&cell.tet, &cell.ascending()), adjoint, state, law)
     }
 
-    fn virtual_work(
-        &self,
-        cell: &Cell,
-        [factor, _]: [f64; 2],
-        velocities: &[Point; 4],
-        coefficients: &[[c64; 4]],
-    ) -> (LocalIntegral<4>, [Point; 4]) {
-        self.tet.virtual_work((&cell.tet, &cell.ascending()), factor, velocities, coefficients).into()
-    }
-
     fn eddy_loss(&self, cell: &Cell, factor: f64, coefficients: &[[c64; 4]]) -> LocalIntegral<4> {
         self.tet.eddy_loss((&cell.tet, &cell.ascending()), factor, coefficients).into()
     }

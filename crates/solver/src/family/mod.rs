@@ -20,7 +20,6 @@ use crate::element::edge::{Ascending, FieldPoint};
 use crate::element::quadrature::Node;
 use crate::element::tabulated::Rule;
 use crate::element::tensor::{Curls, CurlsOfRule};
-use crate::element::virtual_work::VirtualWork;
 use crate::element::volume::Coefficients;
 use crate::elements::{ElementFamily, Order};
 use crate::surface::SurfaceTerm;
@@ -109,12 +108,6 @@ impl<const N: usize, const M: usize> From<ElementIntegral<N, M>> for LocalIntegr
     }
 }
 
-impl<const N: usize> From<VirtualWork<N>> for (LocalIntegral<4>, [Point; 4]) {
-    fn from(VirtualWork { rate, by_velocity }: VirtualWork<N>) -> Self {
-        (rate.into(), by_velocity)
-    }
-}
-
 /// What receives functions: carrier, component, value [1/m or 1], curl [1/m² or 1/m].
 pub type EachFunction<'a> = dyn FnMut(usize, usize, Point, Point) + 'a;
 
@@ -157,7 +150,7 @@ pub(crate) trait Family: Sync {
     fn current_load(&self, cell: &Cell, current_density: &Complex3) -> Local;
     /// `∂/∂x_k (λᵀ f)` for the load of a constant `T` [A/m] that moves with the element.
     fn magnet_shape_derivative(&self, cell: &Cell, source: Point, adjoint: &[[c64; 4]]) -> [Complex3; 4];
-    /// The integral of a density of `B`.
+    /// The integral of a density of `B`, by points that count alike.
     fn flux_integral(
         &self,
         cell: &Cell,
@@ -172,15 +165,6 @@ pub(crate) trait Family: Sync {
         state: &[[c64; 4]],
         law: &dyn Fn(Complex3, Complex3) -> [Complex3; 2],
     ) -> [Complex3; 4];
-    /// The rate of `c ∫(|B|² + p |div A|²) dV` for velocities of the vertices, and its derivatives by these; `law` is `c` and
-    /// the penalty factor `p`, which edge elements do not have.
-    fn virtual_work(
-        &self,
-        cell: &Cell,
-        law: [f64; 2],
-        velocities: &[Point; 4],
-        coefficients: &[[c64; 4]],
-    ) -> (LocalIntegral<4>, [Point; 4]);
     /// `f ∫|A + ∇ψ|² dV`.
     fn eddy_loss(&self, cell: &Cell, factor: f64, coefficients: &[[c64; 4]]) -> LocalIntegral<4>;
     /// `∂/∂x_k (λᵀ M u)` of a surface term.

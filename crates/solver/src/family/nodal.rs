@@ -13,7 +13,6 @@ use crate::element::point::{self, PointField};
 use crate::element::quadratic::LagrangeTet;
 use crate::element::tabulated::{Rule, Tabulated};
 use crate::element::tensor::CurlsOfRule;
-use crate::element::virtual_work;
 use crate::element::volume::{AphiTet, Coefficients, NodalField};
 use crate::element::{Complex3, cross3, impedance, interface};
 use crate::surface::{SurfaceMatrix, SurfaceTerm};
@@ -156,16 +155,6 @@ impl<const N: usize, const F: usize> Family for Nodal<N, F> {
         law: &dyn Fn(Complex3, Complex3) -> [Complex3; 2],
     ) -> [Complex3; 4] {
         point::flux_shape_derivative(self.tet, &cell.tet, &nodal(adjoint), &nodal(state), law)
-    }
-
-    fn virtual_work(
-        &self,
-        cell: &Cell,
-        law: [f64; 2],
-        velocities: &[Point; 4],
-        coefficients: &[[c64; 4]],
-    ) -> (LocalIntegral<4>, [Point; 4]) {
-        virtual_work::virtual_work(self.tet, &cell.tet, law, velocities, &nodal(coefficients)).into()
     }
 
     fn eddy_loss(&self, cell: &Cell, factor: f64, coefficients: &[[c64; 4]]) -> LocalIntegral<4> {

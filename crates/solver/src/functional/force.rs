@@ -1,10 +1,10 @@
 //! Force and torque on a body, by virtual work in the layer of elements around it.
 //!
 //! A rigid virtual velocity `v` of the body's nodes, zero at all others, deforms the elements that touch the body from outside.
-//! The force is minus the rate at which their field energy changes at fixed potentials ([`crate::element::virtual_work`]); inside
-//! the body nothing is deformed. Where the body goes on beyond a conditioned plane, its nodes there keep to the plane, so that a
-//! force is that on the free faces of the meshed part. The same number is the stress `∫σ:∇v` over the layer, which holds with
-//! eddy currents as well: in harmonics it is the time average. The layer must be without current, magnetisation and conductivity.
+//! The force is minus the work of Maxwell's stress there, `−∫σ:∇v` ([`crate::element::virtual_work`]), the rate at which their
+//! energy falls as they carry their flux along; inside the body nothing is deformed. It holds with eddy currents as well: in
+//! harmonics it is the time average. Where the body goes on beyond a conditioned plane, its nodes there keep to the plane, so that
+//! a force is that on the free faces of the meshed part. The layer must be without current, magnetisation and conductivity.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,7 +15,9 @@ use rayon::prelude::*;
 use super::integral::Sum;
 use super::{FunctionalValue, is_static};
 use crate::coil::CoilShape;
+use crate::element::virtual_work::VirtualWork;
 use crate::error::SolverError;
+use crate::family::LocalIntegral;
 use crate::fixed_directions::{beside, extend};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
@@ -124,13 +126,8 @@ impl Force {
         mesh: &Mesh,
         solution: &FieldSolution,
     ) -> BTreeMap<NodeId, Point> {
-        let (space, topology) = (model.space(), model.topology());
-        let of_element = |&e: &ElementId| {
-            let field = solution.element(model, e);
-            let at_rest = [[0.0; 3]; 4];
-            let elements = space.elements();
-            elements.virtual_work(&space.cell(mesh, e), self.law(model, e), &at_rest, field.values()).1
-        };
+        let topology = model.topology();
+        let of_element = |&e: &ElementId| virtual_work((solution, model, mesh), e, &[[0.0; 3]; 4]).1;
         // Computed in parallel, added in the order of the elements.
         let terms: Vec<[Point; 4]> = self.layer.par_iter().map(of_element).collect();
         let mut sums = BTreeMap::new();
@@ -145,19 +142,12 @@ impl Force {
         sums
     }
 
-    /// Share of the energy `ν|B|²` of an element, and the penalty.
-    fn law(&self, model: &FieldModel, e: ElementId) -> [f64; 2] {
-        let share = if is_static(model) { 0.5 } else { 0.25 };
-        [share * model.coefficients_of(e).reluctivity, model.setup().penalty]
-    }
-
     pub(super) fn evaluate(
         &self,
         model: &FieldModel,
         mesh: &Mesh,
         solution: &FieldSolution,
     ) -> FunctionalValue {
-        let space = model.space();
         let free =
             |node: NodeId, vector: Point| self.body.get(&node).map_or([0.0; 3], |held| beside(held, vector));
         let mut sum = Sum::new(model);
@@ -165,10 +155,7 @@ impl Force {
             let nodes = model.topology().tet(e);
             // Minus the rate: the velocities are turned round.
             let velocities = nodes.map(|node| free(node, self.motion.velocity(mesh.point(node))).map(|v| -v));
-            let law = self.law(model, e);
-            let field = solution.element(model, e);
-            let (mut rate, by_velocity) =
-                space.elements().virtual_work(&space.cell(mesh, e), law, &velocities, field.values());
+            let (mut rate, by_velocity) = virtual_work((solution, model, mesh), e, &velocities);
             if let RigidMotion::Rotation { axis, .. } = self.motion {
                 // A node of the body that moves by δx has the velocity axis × δx more.
                 for (k, &node) in nodes.iter().enumerate() {
@@ -180,6 +167,24 @@ impl Force {
         });
         sum.into_value()
     }
+}
+
+/// The work of the stress in an element along velocities of its vertices, with its derivatives, and the derivatives by the velocities.
+fn virtual_work(
+    (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+    e: ElementId,
+    velocities: &[Point; 4],
+) -> (LocalIntegral<4>, [Point; 4]) {
+    let share = if is_static(model) { 0.5 } else { 0.25 };
+    let (space, field) = (model.space(), solution.element(model, e));
+    let cell = space.cell(mesh, e);
+    let mut work = VirtualWork::new(&cell.tet, share * model.coefficients_of(e).reluctivity, velocities);
+    let mut rate = space.elements().flux_integral(&cell, field.values(), &mut |b| work.density(b));
+    let [by_positions, by_velocities] = work.at_vertices(&cell.tet);
+    for (position, more) in rate.positions.iter_mut().zip(by_positions) {
+        (0..3).for_each(|d| position[d] += more[d]);
+    }
+    (rate, by_velocities)
 }
 
 /// The nodes on conditioned surfaces with the normals of these, a node once for each.

@@ -13,7 +13,6 @@ mod integral;
 mod polynomial;
 pub(crate) mod tet;
 pub(crate) mod triangle;
-mod virtual_work;
 
 use std::sync::LazyLock;
 
