@@ -38,6 +38,15 @@ fn the_estimate_of_a_run_is_within_thirty_per_cent_of_its_peak() {
     assert_estimated("run", "inductor.toml", &FEW);
 }
 
+/// Of 40 of them most of the peak is theirs.
+#[test]
+fn every_state_counts() {
+    let frequencies: Vec<String> = (0..40).map(|k| (60 + 10 * k).to_string()).collect();
+    let frequencies = format!("analysis.frequencies=[{}]", frequencies.join(","));
+    let one_design = ["--set", &frequencies, "--set", "accuracy.estimate=false"];
+    assert_estimated("solve", "shield_two_frequencies.toml", &one_design);
+}
+
 /// First order, and so many evaluations that the check on a finer mesh follows.
 const FEW: [&str; 4] = ["--max-evaluations", "2", "--set", "analysis.order=1"];
 

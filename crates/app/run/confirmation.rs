@@ -19,8 +19,8 @@ use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
 use crate::files::{
-    Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, StopReason, Verdict,
-    relative_bar,
+    Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, SAFETY, StopReason,
+    Verdict, relative_bar,
 };
 use crate::show::Observer;
 
@@ -170,6 +170,15 @@ impl Session<'_> {
                 "the gain of this run is not confirmed: less than half of it is left on another mesh, by other elements or \
                  without the estimated errors; {cure}"
             ));
+        }
+        let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error);
+        if accuracy.verdict == Some(Verdict::Confirmed)
+            && bar.is_some_and(|bar| bar * objective.ratio.abs() >= (objective.ratio - 1.0).abs())
+        {
+            observer.warning(
+                "the gain of this run is smaller than its error bar: the checks have a gain as well, but how large it is stays \
+                 open; a finer mesh tells",
+            );
         }
     }
 

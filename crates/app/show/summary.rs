@@ -9,7 +9,8 @@ use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
     Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, MultipoleResult, ObjectiveResult,
-    RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateResult, Verdict, VerificationMesh,
+    RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateResult, Verdict, Verification,
+    VerificationMesh,
 };
 use crate::printable::printable;
 
@@ -164,12 +165,17 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
     rows.push(("F/F0", styled(styles.strong, &super::ratio(*ratio))));
     rows.extend(homogeneity(objective));
-    if let Some(found) = objective.verification.as_ref().filter(|_| !named.is_of_shape) {
-        let name = match found.mesh {
-            VerificationMesh::Fresh => "F/F0 on a fresh mesh",
-            VerificationMesh::Cut => "F/F0 on cut elements",
+    if let Some(found) = &objective.verification {
+        let [of_ratio, of_bounds] = match found.mesh {
+            VerificationMesh::Fresh => ["F/F0 on a fresh mesh", "bounds, fresh mesh"],
+            VerificationMesh::Cut => ["F/F0 on cut elements", "bounds, cut elements"],
         };
-        rows.push((name, format!("{} ({} tetrahedra)", super::ratio(found.ratio), found.tets)));
+        let (name, text) = if named.is_of_shape {
+            (of_bounds, bounds_text(found, styles))
+        } else {
+            (of_ratio, super::ratio(found.ratio))
+        };
+        rows.push((name, format!("{text} ({} tetrahedra)", found.tets)));
     }
     let Some(accuracy) = &result.accuracy else { return rows };
     if let Some(error) = accuracy.error_estimate_relative {
@@ -198,6 +204,16 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ("gain", format!("{}{remark}", styled(style, verdict.describe())))
     }));
     rows
+}
+
+/// Whether the best shape keeps its bounds on the mesh of a check.
+fn bounds_text(found: &Verification, styles: &Styles) -> String {
+    let broken = found.constraints.iter().filter(|constraint| !constraint.satisfied);
+    let broken: Vec<&str> = broken.map(|constraint| constraint.name.as_str()).collect();
+    if broken.is_empty() {
+        return "kept".to_owned();
+    }
+    styled(styles.bad, &format!("VIOLATED: {}", printable(&broken.join(", "))))
 }
 
 /// The terms of an expansion, most of them relative to its main order.

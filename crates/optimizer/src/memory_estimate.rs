@@ -25,6 +25,10 @@ const QUADRATIC_ELEMENT: usize = 2600;
 /// Element derivatives, moved mesh and quality, per element where something moves.
 const MOVING: usize = 170;
 
+/// Solution, files and arrays of every load case and frequency beyond the first, per element: 290 to 370 with linear elements, nodal
+/// and edge, 230 to 350 with quadratic ones.
+const FURTHER_STATE: usize = 340;
+
 /// What a run still holds of its own mesh and patterns while the fresh mesh is worked on, per element.
 const HELD_BY_SETUP: usize = 300;
 
@@ -42,6 +46,8 @@ const TWO_LEVELS_PER_UNKNOWN: [usize; 2] = [800, 1800];
 pub struct Sizes {
     /// Arrays by element, and the elastic solver.
     arrays: usize,
+    /// What states beyond the first hold until they are written.
+    further_states: usize,
     /// Matrices of the field.
     matrices: usize,
     /// Their preconditioners.
@@ -72,6 +78,7 @@ impl Sizes {
         let harmonic = problem.states().iter().filter(|state| state.angular_frequency() != 0.0);
         let mut sizes = Self {
             arrays: tets * element + elastic,
+            further_states: problem.states().len().saturating_sub(1) * tets * FURTHER_STATE,
             matrices: 0,
             preconditioners: 0,
             tets,
@@ -109,7 +116,7 @@ impl Sizes {
 
     /// Bytes that the process holds at the peak of one evaluation, about.
     pub fn here(&self) -> usize {
-        PROCESS + self.arrays + self.matrices + self.preconditioners
+        PROCESS + self.arrays + self.further_states + self.matrices + self.preconditioners
     }
 
     /// Bytes that the process holds while it works on something else that takes so many for each element, and so many more for

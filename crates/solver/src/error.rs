@@ -135,6 +135,12 @@ pub enum SolverError {
         place: [f64; 3],
         what: &'static str,
     },
+    /// A body on which a force is sought that fills the mesh.
+    #[error(
+        "the force on `{body}` is taken in the layer of elements around it, and there is none: it needs a body with mesh around \
+         it, and not all regions in it"
+    )]
+    NoLayer { body: String },
     /// A B–H law where the problem is shared out among ranks.
     #[error(
         "the region `{region}` has a B–H curve, which is solved for in one process: start the program without `mpirun`, or give \

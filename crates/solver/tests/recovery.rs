@@ -7,8 +7,11 @@ use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::{Point, dot, sub};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
 use fluxmorph_solver::element::Complex3;
+use fluxmorph_solver::functional::{Compared, Follow, Observed, Weighting};
 use fluxmorph_solver::recovery::{RecoveredPoint, probe};
-use fluxmorph_solver::{Boundary, ElementFamily, FieldModel, FieldModelSetup, Material, Order, UniformField};
+use fluxmorph_solver::{
+    Boundary, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, UniformField,
+};
 
 use crate::{ALL, OUTSIDE, lines, painted, solved};
 
@@ -115,6 +118,35 @@ fn half_of_a_device_has_the_values_of_the_whole_at_every_point() {
                 let off = (0..3).map(|d| (part[d] - all[d]).norm()).fold(0.0, f64::max);
                 // Fields of order 1, by solutions to 1e-11.
                 assert!(off < 1e-8, "{elements:?} {kind} {axis} {place:?}: {part:?} {all:?}");
+            }
+        }
+    }
+}
+
+/// The mean of the whole has nothing across the first plane and along the second, where that of the part has something.
+#[test]
+fn half_of_a_device_has_the_homogeneity_of_the_whole() {
+    let half = half();
+    let wholes =
+        [(doubled(&half, 0), &[][..], &OUTSIDE[..4]), (doubled(&half, 2), &["x_min"][..], &HALF[..])];
+    for of in [Compared::Vector, Compared::Modulus] {
+        for weighting in [Weighting::Volume, Weighting::Point] {
+            let figures = |mesh: &Mesh, parallel: &[&str], applied: &[&str]| {
+                let (model, solution) = solved(mesh, setup(ALL[2], parallel, applied));
+                let observed = Observed::Homogeneity { of, weighting };
+                let block = Functional::observation(mesh, RegionId(1), observed, Follow::Held);
+                let block = block.expect("a region with elements");
+                let value = block.evaluate(&model, mesh, &solution).expect("finite").value;
+                let quality = block.field_quality(&model, mesh, &solution).expect("its figures");
+                [value, quality.mean, quality.peak_to_peak]
+            };
+            let part = figures(&half, &["x_min"], &HALF);
+            assert!(part[0] > 1e-3, "a field that is not homogeneous: {part:?}");
+            for (whole, parallel, applied) in &wholes {
+                let all = figures(whole, parallel, applied);
+                let off = (0..3).map(|k| (part[k] / all[k] - 1.0).abs()).fold(0.0, f64::max);
+                // By solutions to 1e-11.
+                assert!(off < 1e-8, "{of:?} {weighting:?}: {part:?} {all:?}");
             }
         }
     }

@@ -1,6 +1,6 @@
 //! Why the mesh does not follow a design, and what would help, from where and how an element is squeezed.
 
-use fluxmorph_geometry::tet4::{centroid, dot, sub};
+use fluxmorph_geometry::tet4::{Point, centroid, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use super::shape::Shape;
@@ -12,6 +12,15 @@ pub struct Cut {
     pub cause: String,
     /// What would help.
     pub cure: &'static str,
+}
+
+/// Cosine of an angle between directions of the design from which its surface has an edge: facets of a curved surface have less than
+/// these 25 degrees between them.
+const EDGE: f64 = 0.9;
+
+/// Whether some of the unit vectors are at an angle to each other.
+fn bends(directions: &[Point]) -> bool {
+    directions.iter().any(|one| directions.iter().any(|other| dot(*one, *other) < EDGE))
 }
 
 impl std::fmt::Display for Cut {
@@ -56,6 +65,12 @@ impl Cut {
             (
                 format!("neighbouring nodes of the design lie {step:.1} mm apart"),
                 "a filter or a control grid makes the design smoother",
+            )
+        } else if bends(&rows.iter().map(|&row| surface.directions()[row]).collect::<Vec<_>>()) {
+            (
+                "the design surface has an edge there, whose faces move towards each other".to_owned(),
+                "a coarser filter or control grid, one of the faces alone as the design, or narrower bounds leave the element \
+                 room",
             )
         } else {
             (

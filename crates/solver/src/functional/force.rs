@@ -73,7 +73,7 @@ impl Force {
     /// The force on the body that some regions make up.
     ///
     /// # Errors
-    /// [`SolverError::EmptyRegion`] for a body without elements, [`SolverError::Layer`] where the layer around it is not free.
+    /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not free.
     pub fn new(
         model: &FieldModel,
         mesh: &Mesh,
@@ -92,8 +92,7 @@ impl Force {
         let around = body.keys().flat_map(|&node| topology.elements_around(node)).copied();
         let layer: BTreeSet<ElementId> = around.filter(|e| !inside(e)).collect();
         if layer.is_empty() {
-            let expected = "a force needs a body with mesh around it";
-            return Err(SolverError::EmptyRegion { region: name.to_owned(), expected });
+            return Err(SolverError::NoLayer { body: name.to_owned() });
         }
         let fault = |e: ElementId, what| SolverError::Layer {
             body: name.to_owned(),

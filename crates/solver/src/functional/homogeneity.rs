@@ -1,6 +1,6 @@
 //! How homogeneous a field is: its deviation from its own mean, which no change of the current alters.
 //!
-//! Of samples `b_k` with weights `w_k`, `b̄ = Σ w b / Σ w`:
+//! Of samples `b_k` with weights `w_k`, `b̄ = Σ w b / Σ w`, of vectors without what the images beyond symmetry planes cancel:
 //!
 //! `F = Σ w |b − b̄|² / (Σ w · |b̄|²)`,  `∂F/∂b_k = w_k (conj(b_k − b̄) − F conj(b̄)) / (Σ w · |b̄|²)`
 //!
@@ -66,13 +66,17 @@ pub(super) struct Spread<'a> {
 }
 
 impl<'a> Spread<'a> {
-    /// Of samples with their weights.
-    pub(super) fn new(samples: &'a [(Complex3, f64)], of: Compared) -> Self {
+    /// Of samples with their weights, and the orthonormal directions in which the vectors of the whole device have no mean.
+    pub(super) fn new(samples: &'a [(Complex3, f64)], of: Compared, odd: &[Point]) -> Self {
         let compared: Vec<Complex3> = samples.iter().map(|(b, _)| of.of(b)).collect();
         let weight: f64 = samples.iter().map(|(_, w)| w).sum();
         let mut mean = [c64::default(); 3];
         for (b, (_, w)) in compared.iter().zip(samples) {
             (0..3).for_each(|d| mean[d] += w * b[d] / weight);
+        }
+        for direction in odd.iter().filter(|_| of == Compared::Vector) {
+            let along: c64 = (0..3).map(|d| mean[d] * direction[d]).sum();
+            (0..3).for_each(|d| mean[d] -= along * direction[d]);
         }
         Self { samples, of, compared, weight, mean }
     }
@@ -146,6 +150,8 @@ mod tests {
 
     const OF: [Compared; 3] = [Compared::Vector, Compared::Component([0.6, 0.0, 0.8]), Compared::Modulus];
 
+    const ODD: &[Point] = &[[0.0, 0.6, -0.8]];
+
     fn samples() -> Vec<(Complex3, f64)> {
         let value = |k: usize| c64::new((12.9898 * k as f64 + 1.0).sin(), (78.233 * k as f64 + 2.0).sin());
         (0..7)
@@ -158,13 +164,13 @@ mod tests {
         // Truncation and rounding of a central difference of values of order one balance near 1e-5.
         let h = 1e-5;
         for of in OF {
-            let exact = Spread::new(&samples(), of).variance_with_derivatives().1;
+            let exact = Spread::new(&samples(), of, ODD).variance_with_derivatives().1;
             for (k, d) in (0..7).flat_map(|k| (0..3).map(move |d| (k, d))) {
                 for direction in [c64::new(1.0, 0.0), c64::new(0.0, 1.0)] {
                     let at = |s: f64| {
                         let mut moved = samples();
                         moved[k].0[d] += s * direction;
-                        Spread::new(&moved, of).variance()
+                        Spread::new(&moved, of, ODD).variance()
                     };
                     let difference = (at(h) - at(-h)) / (2.0 * h);
                     let derivative = 2.0 * (exact[k][d] * direction).re;
@@ -181,10 +187,10 @@ mod tests {
         };
         for of in OF {
             let [one, other] = [c64::new(1.0, 0.0), c64::new(-30.0, 4.0)]
-                .map(|factor| Spread::new(&scaled(factor), of).variance());
+                .map(|factor| Spread::new(&scaled(factor), of, &[]).variance());
             assert!((one / other - 1.0).abs() < 1e-13, "{of:?}");
             let uniform: Vec<(Complex3, f64)> = samples().iter().map(|(_, w)| (samples()[0].0, *w)).collect();
-            assert!(Spread::new(&uniform, of).variance() < 1e-30);
+            assert!(Spread::new(&uniform, of, &[]).variance() < 1e-30);
         }
     }
 
@@ -194,7 +200,7 @@ mod tests {
         let samples: Vec<(Complex3, f64)> =
             [1.0, 3.0].map(|b: f64| ([c64::default(), c64::from(b), c64::default()], 2.0)).to_vec();
         for of in [Compared::Vector, Compared::Component([0.0, 1.0, 0.0]), Compared::Modulus] {
-            let quality = Spread::new(&samples, of).quality();
+            let quality = Spread::new(&samples, of, &[]).quality();
             let figures = [quality.mean, quality.rms, quality.peak_to_peak];
             assert!(figures.iter().zip([2.0, 0.5, 1.0]).all(|(a, b)| (a - b).abs() < 1e-15), "{quality:?}");
         }

@@ -179,7 +179,7 @@ impl Observation {
             (Some(fixed), Some(explicit)) => {
                 let blended = fixed.places.field(field)?;
                 let fields = blended.flux_densities();
-                let of = self.of_samples(&fixed.means(&fields), model.angular_frequency());
+                let of = self.of_samples(&fixed.means(&fields), (model, mesh));
                 let mut by_fields = vec![[c64::default(); 3]; fields.len()];
                 for ((parts, _), by_b) in fixed.samples.iter().zip(&of.by_b) {
                     for &(place, share) in parts {
@@ -202,7 +202,7 @@ impl Observation {
         mut explicit: Option<&mut [Point]>,
     ) -> f64 {
         let samples = self.samples_of_cells(model, mesh, solution);
-        let of = self.of_samples(&samples, model.angular_frequency());
+        let of = self.of_samples(&samples, (model, mesh));
         let rule = self.rule(model.space().order());
         let places = self.cells.iter().flat_map(|c| rule.iter().map(move |q| (c, q)));
         for (k, (cell, (lambda, share))) in places.enumerate() {
@@ -266,10 +266,10 @@ impl Observation {
     }
 
     /// The value of samples, and its derivatives.
-    fn of_samples(&self, samples: &[Sample], angular_frequency: f64) -> OfSamples {
+    fn of_samples(&self, samples: &[Sample], (model, mesh): (&FieldModel, &Mesh)) -> OfSamples {
         if let Observed::Homogeneity { of, weighting } = self.observed {
             let weighted = weighted(samples, weighting);
-            let spread = Spread::new(&weighted, of);
+            let spread = Spread::new(&weighted, of, &self.odd_directions(model, mesh));
             let (value, by_b) = spread.variance_with_derivatives();
             let by_volume = match weighting {
                 Weighting::Volume => spread.variance_by_weights(),
@@ -279,7 +279,7 @@ impl Observation {
         }
         let mut sum = OfSamples { value: 0.0, by_b: Vec::new(), by_volume: Vec::new() };
         for &(b, volume) in samples {
-            let (term, by_b) = self.term(b, volume, angular_frequency);
+            let (term, by_b) = self.term(b, volume, model.angular_frequency());
             sum.value += term;
             sum.by_b.push(by_b);
             let is_integral =
@@ -287,6 +287,11 @@ impl Observation {
             sum.by_volume.push(if is_integral { term / volume } else { 0.0 });
         }
         sum
+    }
+
+    /// Directions in which the region and its images have no mean.
+    fn odd_directions(&self, model: &FieldModel, mesh: &Mesh) -> Vec<Point> {
+        model.walls().odd_directions(model.topology(), mesh, self.elements())
     }
 
     /// How homogeneous the field is, where that is what is observed.
@@ -298,7 +303,8 @@ impl Observation {
     ) -> Option<FieldQuality> {
         let Observed::Homogeneity { of, weighting } = self.observed else { return None };
         let samples = self.samples(model, mesh, solution).ok()?;
-        Some(Spread::new(&weighted(&samples, weighting), of).quality())
+        let odd = self.odd_directions(model, mesh);
+        Some(Spread::new(&weighted(&samples, weighting), of, &odd).quality())
     }
 
     /// What a flux density [T] misses of what is asked for [T], where a quality of the field is.
@@ -314,7 +320,7 @@ impl Observation {
             }
             Observed::Homogeneity { of, weighting } => {
                 let samples = weighted(&self.samples(model, mesh, solution).ok()?, weighting);
-                (of, Spread::new(&samples, of).mean())
+                (of, Spread::new(&samples, of, &self.odd_directions(model, mesh)).mean())
             }
             Observed::Deviation { .. } | Observed::Component { .. } => return None,
         };

@@ -4,14 +4,14 @@
 //! flux-normal one `−RB(x)`; the potential has the other sign. Planes at right angles to each other are taken, with the images of
 //! images. A patch ends at all other outer faces, and at a plane in which a part of them lies or which elements lie behind.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
 
 use crate::boundary::Boundary;
-use crate::fixed_directions::{beside, unit};
+use crate::fixed_directions::{beside, extend, tangents, unit};
 use crate::model::FieldModel;
 
 /// Sine of an angle up to which directions count as one, and share of the way to a point by which it may lie off a plane: faces
@@ -20,6 +20,9 @@ const ROUNDING: f64 = 1e-3;
 
 /// Layers of elements around the start of a patch after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
+
+/// Planes of the faces of a region, at most: those of a box.
+const MOST_PLANES: usize = 6;
 
 /// The outer faces of a model with what makes an image there, by node.
 #[derive(Clone, Debug, Default)]
@@ -90,6 +93,47 @@ impl Walls {
         let mut faces: Vec<_> = outer.flat_map(of_face).collect();
         faces.sort_unstable();
         Ok(Self { faces })
+    }
+
+    /// Directions in which a mean of `B` over some elements and over their images has nothing: across flux-parallel planes in which
+    /// faces of theirs lie, and along flux-normal ones. None where that would be all directions, or where there are as many planes
+    /// as on a curved surface.
+    pub(crate) fn odd_directions(
+        &self,
+        topology: &Topology,
+        mesh: &Mesh,
+        elements: impl Iterator<Item = ElementId>,
+    ) -> Vec<Point> {
+        let elements: HashSet<ElementId> = elements.collect();
+        let mut planes: Vec<Plane> = Vec::new();
+        for &(node, face, condition) in self.faces.iter().filter(|(node, face, _)| *node == face[0]) {
+            let holds =
+                |e: &ElementId| elements.contains(e) && face.iter().all(|n| topology.tet(*e).contains(n));
+            if !topology.elements_around(node).iter().any(holds) {
+                continue;
+            }
+            let normal = unit(area_vector(face.map(|n| mesh.point(n))));
+            let plane = Plane { place: mesh.point(node), normal, condition };
+            match planes.iter_mut().find(|known| known.lies_in(&plane)) {
+                Some(known) if known.condition != condition => known.condition = Condition::Other,
+                Some(_) => {}
+                None => planes.push(plane),
+            }
+            if planes.len() > MOST_PLANES {
+                return Vec::new();
+            }
+        }
+        let mut odd = Vec::new();
+        for plane in planes {
+            let (first, second) = tangents(plane.normal);
+            let directions = match plane.condition {
+                Condition::FluxParallel => vec![plane.normal],
+                Condition::FluxNormal => vec![first, second],
+                Condition::Other => Vec::new(),
+            };
+            directions.into_iter().for_each(|direction| extend(&mut odd, direction, ROUNDING));
+        }
+        if odd.len() < 3 { odd } else { Vec::new() }
     }
 
     /// The planes of the outer faces at a node that are at right angles to each other; one with a part of another condition, or with
