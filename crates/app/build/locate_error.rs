@@ -199,6 +199,10 @@ impl Blame<'_> {
                 self.at(&format!("materials.{name}.{key}"), error)
             }
             SolverError::SolidOnRanks { coil } => self.at(&format!("{}.conductor", self.coil(coil)?), error),
+            SolverError::Layer { body, .. } | SolverError::NoLayer { body } => {
+                let index = self.config.forces.iter().position(|own| own.name == *body)?;
+                self.at(&format!("forces[{index}].regions"), error)
+            }
             SolverError::PointOutside { wanted_by: PointsOf::Probe(name), .. } => {
                 let index = self.config.probes.iter().position(|own| own.name == *name)?;
                 self.at(&format!("probes[{index}].points"), error)

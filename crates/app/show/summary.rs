@@ -165,13 +165,14 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
     rows.push(("F/F0", styled(styles.strong, &super::ratio(*ratio))));
     rows.extend(homogeneity(objective));
-    if let Some(found) = &objective.verification {
-        let [of_ratio, of_bounds] = match found.mesh {
-            VerificationMesh::Fresh => ["F/F0 on a fresh mesh", "bounds, fresh mesh"],
-            VerificationMesh::Cut => ["F/F0 on cut elements", "bounds, cut elements"],
+    let has_a_say = |found: &&Verification| !named.is_of_shape || !found.constraints.is_empty();
+    if let Some(found) = objective.verification.as_ref().filter(has_a_say) {
+        let [of_ratio, of_constraints] = match found.mesh {
+            VerificationMesh::Fresh => ["F/F0 on a fresh mesh", "constraints, fresh mesh"],
+            VerificationMesh::Cut => ["F/F0 on cut elements", "constraints, cut mesh"],
         };
         let (name, text) = if named.is_of_shape {
-            (of_bounds, bounds_text(found, styles))
+            (of_constraints, constraints_text(found, styles))
         } else {
             (of_ratio, super::ratio(found.ratio))
         };
@@ -206,8 +207,8 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows
 }
 
-/// Whether the best shape keeps its bounds on the mesh of a check.
-fn bounds_text(found: &Verification, styles: &Styles) -> String {
+/// Whether the best shape keeps all constraints on the mesh of a check.
+fn constraints_text(found: &Verification, styles: &Styles) -> String {
     let broken = found.constraints.iter().filter(|constraint| !constraint.satisfied);
     let broken: Vec<&str> = broken.map(|constraint| constraint.name.as_str()).collect();
     if broken.is_empty() {

@@ -137,8 +137,8 @@ pub enum SolverError {
     },
     /// A body on which a force is sought that fills the mesh.
     #[error(
-        "the force on `{body}` is taken in the layer of elements around it, and there is none: it needs a body with mesh around \
-         it, and not all regions in it"
+        "the force on `{body}` is taken in the layer of elements around it, and there is none: leave at least one \
+         region around the body out of its `regions`"
     )]
     NoLayer { body: String },
     /// A B–H law where the problem is shared out among ranks.

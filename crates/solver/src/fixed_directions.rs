@@ -109,6 +109,7 @@ fn smooth_surfaces(faces: &[(Fix, Point)]) -> Vec<(Fix, Point)> {
     sums.into_iter().map(|(fix, sum)| (fix, unit(sum))).collect()
 }
 
+/// A vector with the length 1.
 pub(crate) fn unit(v: Point) -> Point {
     let length = norm(v);
     v.map(|c| c / length)

@@ -5,6 +5,17 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use super::shape::Shape;
 
+/// Cosine of an angle between directions of the design from which its surface has an edge: facets of a curved surface have less than
+/// these 25 degrees between them.
+const EDGE: f64 = 0.9;
+
+/// Whether two of the directions, of unit length or zero for nodes that cannot move, are those of faces that meet in an edge, and not of
+/// the two sides of a plate.
+fn bends(directions: &[Point]) -> bool {
+    let moving: Vec<&Point> = directions.iter().filter(|direction| **direction != [0.0; 3]).collect();
+    moving.iter().any(|one| moving.iter().any(|other| dot(**one, **other).abs() < EDGE))
+}
+
 /// Why a design is not carried.
 #[derive(Clone, Debug)]
 pub struct Cut {
@@ -12,15 +23,6 @@ pub struct Cut {
     pub cause: String,
     /// What would help.
     pub cure: &'static str,
-}
-
-/// Cosine of an angle between directions of the design from which its surface has an edge: facets of a curved surface have less than
-/// these 25 degrees between them.
-const EDGE: f64 = 0.9;
-
-/// Whether some of the unit vectors are at an angle to each other.
-fn bends(directions: &[Point]) -> bool {
-    directions.iter().any(|one| directions.iter().any(|other| dot(*one, *other) < EDGE))
 }
 
 impl std::fmt::Display for Cut {
@@ -85,5 +87,19 @@ impl Cut {
             "element {element} of region `{region}` at ({x:.1}, {y:.1}, {z:.1}) mm would be squeezed, as {why}"
         );
         Self { cause, cure }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_edge_is_where_faces_meet() {
+        let (up, aside) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);
+        assert!(bends(&[up, aside]) && bends(&[up, [0.8, 0.0, 0.6], [0.0; 3]]));
+        assert!(!bends(&[up, [0.0; 3], up]), "a node that cannot move");
+        assert!(!bends(&[up, [0.0, 0.0, -1.0]]), "both sides of a plate");
+        assert!(!bends(&[up, [0.0, 0.28, 0.96]]), "facets of a curve");
     }
 }

@@ -37,7 +37,7 @@ pub fn squared_deviation(factor: f64, remanence: Point) -> impl Fn(Complex3) -> 
     }
 }
 
-/// The integral of a density of `B = curl A` over a tetrahedron, by the rule that is exact for squares.
+/// The integral of a density of `B = curl A` over a tetrahedron, by the rule that is exact for squares, whose points count alike.
 pub fn flux_integral<const N: usize>(
     shape: &Lagrange<N, 4>,
     tet: &Tet4,

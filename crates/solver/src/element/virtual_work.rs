@@ -16,11 +16,11 @@ use super::Complex3;
 use super::density::OfFlux;
 
 /// A tensor with the index `[d][i]`.
-pub(super) type Tensor = [Point; 3];
+type Tensor = [Point; 3];
 
 /// The tensor with some entries.
 #[inline]
-pub(super) fn tensor(entry: impl Fn(usize, usize) -> f64) -> Tensor {
+fn tensor(entry: impl Fn(usize, usize) -> f64) -> Tensor {
     std::array::from_fn(|d| std::array::from_fn(|i| entry(d, i)))
 }
 

@@ -117,7 +117,7 @@ impl Force {
         Ok(Self { layer: layer.into_iter().collect(), body, motion })
     }
 
-    /// What acts on every node of the body [N], ascending by node: minus the derivative of the layer's energy by its position.
+    /// What acts on every node of the body [N], ascending by node: minus the work of the stress in the layer along its velocity.
     /// Sums of it are force and torque; nodes inside the body have nothing.
     pub fn nodal(
         &self,

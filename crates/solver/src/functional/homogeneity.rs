@@ -66,7 +66,7 @@ pub(super) struct Spread<'a> {
 }
 
 impl<'a> Spread<'a> {
-    /// Of samples with their weights, and the orthonormal directions in which the vectors of the whole device have no mean.
+    /// Of samples with their weights, and of vectors the orthonormal directions in which those of the whole device have no mean.
     pub(super) fn new(samples: &'a [(Complex3, f64)], of: Compared, odd: &[Point]) -> Self {
         let compared: Vec<Complex3> = samples.iter().map(|(b, _)| of.of(b)).collect();
         let weight: f64 = samples.iter().map(|(_, w)| w).sum();
@@ -74,7 +74,7 @@ impl<'a> Spread<'a> {
         for (b, (_, w)) in compared.iter().zip(samples) {
             (0..3).for_each(|d| mean[d] += w * b[d] / weight);
         }
-        for direction in odd.iter().filter(|_| of == Compared::Vector) {
+        for direction in odd {
             let along: c64 = (0..3).map(|d| mean[d] * direction[d]).sum();
             (0..3).for_each(|d| mean[d] -= along * direction[d]);
         }
@@ -163,19 +163,36 @@ mod tests {
     fn the_derivatives_match_central_differences() {
         // Truncation and rounding of a central difference of values of order one balance near 1e-5.
         let h = 1e-5;
-        for of in OF {
-            let exact = Spread::new(&samples(), of, ODD).variance_with_derivatives().1;
+        for (of, odd) in OF.map(|of| (of, &[][..])).into_iter().chain([(Compared::Vector, ODD)]) {
+            let exact = Spread::new(&samples(), of, odd).variance_with_derivatives().1;
             for (k, d) in (0..7).flat_map(|k| (0..3).map(move |d| (k, d))) {
                 for direction in [c64::new(1.0, 0.0), c64::new(0.0, 1.0)] {
                     let at = |s: f64| {
                         let mut moved = samples();
                         moved[k].0[d] += s * direction;
-                        Spread::new(&moved, of, ODD).variance()
+                        Spread::new(&moved, of, odd).variance()
                     };
                     let difference = (at(h) - at(-h)) / (2.0 * h);
                     let derivative = 2.0 * (exact[k][d] * direction).re;
                     assert!((difference - derivative).abs() < 1e-9, "{of:?}: {difference} {derivative}");
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn so_do_those_by_the_weights() {
+        let h = 1e-5;
+        for (of, odd) in OF.map(|of| (of, &[][..])).into_iter().chain([(Compared::Vector, ODD)]) {
+            let exact = Spread::new(&samples(), of, odd).variance_by_weights();
+            for (k, exact) in exact.into_iter().enumerate() {
+                let at = |s: f64| {
+                    let mut other = samples();
+                    other[k].1 += s;
+                    Spread::new(&other, of, odd).variance()
+                };
+                let difference = (at(h) - at(-h)) / (2.0 * h);
+                assert!((difference - exact).abs() < 1e-9, "{of:?}: {difference} {exact}");
             }
         }
     }

@@ -179,7 +179,7 @@ impl Observation {
             (Some(fixed), Some(explicit)) => {
                 let blended = fixed.places.field(field)?;
                 let fields = blended.flux_densities();
-                let of = self.of_samples(&fixed.means(&fields), (model, mesh));
+                let of = self.of_samples(&fixed.means(&fields), model);
                 let mut by_fields = vec![[c64::default(); 3]; fields.len()];
                 for ((parts, _), by_b) in fixed.samples.iter().zip(&of.by_b) {
                     for &(place, share) in parts {
@@ -202,7 +202,7 @@ impl Observation {
         mut explicit: Option<&mut [Point]>,
     ) -> f64 {
         let samples = self.samples_of_cells(model, mesh, solution);
-        let of = self.of_samples(&samples, (model, mesh));
+        let of = self.of_samples(&samples, model);
         let rule = self.rule(model.space().order());
         let places = self.cells.iter().flat_map(|c| rule.iter().map(move |q| (c, q)));
         for (k, (cell, (lambda, share))) in places.enumerate() {
@@ -266,10 +266,10 @@ impl Observation {
     }
 
     /// The value of samples, and its derivatives.
-    fn of_samples(&self, samples: &[Sample], (model, mesh): (&FieldModel, &Mesh)) -> OfSamples {
+    fn of_samples(&self, samples: &[Sample], model: &FieldModel) -> OfSamples {
         if let Observed::Homogeneity { of, weighting } = self.observed {
             let weighted = weighted(samples, weighting);
-            let spread = Spread::new(&weighted, of, &self.odd_directions(model, mesh));
+            let spread = Spread::new(&weighted, of, &self.odd_directions(model));
             let (value, by_b) = spread.variance_with_derivatives();
             let by_volume = match weighting {
                 Weighting::Volume => spread.variance_by_weights(),
@@ -289,9 +289,14 @@ impl Observation {
         sum
     }
 
-    /// Directions in which the region and its images have no mean.
-    fn odd_directions(&self, model: &FieldModel, mesh: &Mesh) -> Vec<Point> {
-        model.walls().odd_directions(model.topology(), mesh, self.elements())
+    /// Directions in which the vectors in the region and in its images have no mean.
+    fn odd_directions(&self, model: &FieldModel) -> Vec<Point> {
+        match self.observed {
+            Observed::Homogeneity { of: Compared::Vector, .. } => {
+                model.symmetry_planes().odd_directions(model.topology(), self.elements())
+            }
+            _ => Vec::new(),
+        }
     }
 
     /// How homogeneous the field is, where that is what is observed.
@@ -303,7 +308,7 @@ impl Observation {
     ) -> Option<FieldQuality> {
         let Observed::Homogeneity { of, weighting } = self.observed else { return None };
         let samples = self.samples(model, mesh, solution).ok()?;
-        let odd = self.odd_directions(model, mesh);
+        let odd = self.odd_directions(model);
         Some(Spread::new(&weighted(&samples, weighting), of, &odd).quality())
     }
 
@@ -320,7 +325,7 @@ impl Observation {
             }
             Observed::Homogeneity { of, weighting } => {
                 let samples = weighted(&self.samples(model, mesh, solution).ok()?, weighting);
-                (of, Spread::new(&samples, of, &self.odd_directions(model, mesh)).mean())
+                (of, Spread::new(&samples, of, &self.odd_directions(model)).mean())
             }
             Observed::Deviation { .. } | Observed::Component { .. } => return None,
         };

@@ -4,14 +4,14 @@
 //! flux-normal one `−RB(x)`; the potential has the other sign. Planes at right angles to each other are taken, with the images of
 //! images. A patch ends at all other outer faces, and at a plane in which a part of them lies or which elements lie behind.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap};
 
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
 
 use crate::boundary::Boundary;
-use crate::fixed_directions::{beside, extend, tangents, unit};
+use crate::fixed_directions::{beside, unit};
 use crate::model::FieldModel;
 
 /// Sine of an angle up to which directions count as one, and share of the way to a point by which it may lie off a plane: faces
@@ -20,9 +20,6 @@ const ROUNDING: f64 = 1e-3;
 
 /// Layers of elements around the start of a patch after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
-
-/// Planes of the faces of a region, at most: those of a box.
-const MOST_PLANES: usize = 6;
 
 /// The outer faces of a model with what makes an image there, by node.
 #[derive(Clone, Debug, Default)]
@@ -33,7 +30,7 @@ pub(crate) struct Walls {
 
 /// What holds on a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Condition {
+pub(super) enum Condition {
     FluxParallel,
     FluxNormal,
     /// Anything else: `A` is given, is a gradient along the face, or free.
@@ -42,11 +39,11 @@ enum Condition {
 
 /// A symmetry plane.
 #[derive(Clone, Copy, Debug)]
-struct Plane {
+pub(super) struct Plane {
     place: Point,
     /// Of unit length.
-    normal: Point,
-    condition: Condition,
+    pub(super) normal: Point,
+    pub(super) condition: Condition,
 }
 
 /// Which planes an image is beyond, a bit each; the element itself where it is zero.
@@ -72,18 +69,7 @@ impl Walls {
         boundaries: &[(String, Boundary)],
         gradients: &[[NodeId; 3]],
     ) -> Result<Self, MeshError> {
-        let mut conditions = HashMap::new();
-        for (name, boundary) in boundaries {
-            let condition = match boundary {
-                Boundary::FluxParallel => Condition::FluxParallel,
-                Boundary::FluxNormal => Condition::FluxNormal,
-                Boundary::UniformField(_) => Condition::Other,
-            };
-            for face in topology.surface(name)? {
-                let known = conditions.entry(face_key(*face)).or_insert(condition);
-                *known = if *known == condition { condition } else { Condition::Other };
-            }
-        }
+        let mut conditions = conditions(topology, boundaries)?;
         conditions.extend(gradients.iter().map(|face| (face_key(*face), Condition::Other)));
         let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
         let of_face = |facet: &Facet| {
@@ -95,47 +81,6 @@ impl Walls {
         Ok(Self { faces })
     }
 
-    /// Directions in which a mean of `B` over some elements and over their images has nothing: across flux-parallel planes in which
-    /// faces of theirs lie, and along flux-normal ones. None where that would be all directions, or where there are as many planes
-    /// as on a curved surface.
-    pub(crate) fn odd_directions(
-        &self,
-        topology: &Topology,
-        mesh: &Mesh,
-        elements: impl Iterator<Item = ElementId>,
-    ) -> Vec<Point> {
-        let elements: HashSet<ElementId> = elements.collect();
-        let mut planes: Vec<Plane> = Vec::new();
-        for &(node, face, condition) in self.faces.iter().filter(|(node, face, _)| *node == face[0]) {
-            let holds =
-                |e: &ElementId| elements.contains(e) && face.iter().all(|n| topology.tet(*e).contains(n));
-            if !topology.elements_around(node).iter().any(holds) {
-                continue;
-            }
-            let normal = unit(area_vector(face.map(|n| mesh.point(n))));
-            let plane = Plane { place: mesh.point(node), normal, condition };
-            match planes.iter_mut().find(|known| known.lies_in(&plane)) {
-                Some(known) if known.condition != condition => known.condition = Condition::Other,
-                Some(_) => {}
-                None => planes.push(plane),
-            }
-            if planes.len() > MOST_PLANES {
-                return Vec::new();
-            }
-        }
-        let mut odd = Vec::new();
-        for plane in planes {
-            let (first, second) = tangents(plane.normal);
-            let directions = match plane.condition {
-                Condition::FluxParallel => vec![plane.normal],
-                Condition::FluxNormal => vec![first, second],
-                Condition::Other => Vec::new(),
-            };
-            directions.into_iter().for_each(|direction| extend(&mut odd, direction, ROUNDING));
-        }
-        if odd.len() < 3 { odd } else { Vec::new() }
-    }
-
     /// The planes of the outer faces at a node that are at right angles to each other; one with a part of another condition, or with
     /// an element at the node behind it, as one of another condition.
     fn at(&self, topology: &Topology, mesh: &Mesh, node: NodeId) -> Vec<Plane> {
@@ -143,8 +88,7 @@ impl Walls {
         let at_node = self.faces[first..].iter().take_while(|(of, ..)| *of == node);
         let mut planes: Vec<Plane> = Vec::new();
         for &(_, face, condition) in at_node {
-            let area = area_vector(face.map(|n| mesh.point(n)));
-            let plane = Plane { place: mesh.point(node), normal: unit(area), condition };
+            let plane = Plane { place: mesh.point(node), ..Plane::of(mesh, face, condition) };
             if let Some(known) = planes.iter_mut().find(|known| known.is_parallel(&plane)) {
                 known.condition = if known.condition == condition { condition } else { Condition::Other };
             } else if planes.iter().all(|known| known.is_square_to(&plane)) {
@@ -160,7 +104,47 @@ impl Walls {
     }
 }
 
+/// The condition of every face of the named surfaces, by its key; of one that has two of them [`Condition::Other`].
+///
+/// # Errors
+/// [`MeshError::UnknownSurface`].
+pub(super) fn conditions(
+    topology: &Topology,
+    boundaries: &[(String, Boundary)],
+) -> Result<HashMap<[NodeId; 3], Condition>, MeshError> {
+    let mut conditions = HashMap::new();
+    for (name, boundary) in boundaries {
+        let condition = match boundary {
+            Boundary::FluxParallel => Condition::FluxParallel,
+            Boundary::FluxNormal => Condition::FluxNormal,
+            Boundary::UniformField(_) => Condition::Other,
+        };
+        for face in topology.surface(name)? {
+            let known = conditions.entry(face_key(*face)).or_insert(condition);
+            *known = if *known == condition { condition } else { Condition::Other };
+        }
+    }
+    Ok(conditions)
+}
+
 impl Plane {
+    /// That of a face.
+    pub(super) fn of(mesh: &Mesh, face: [NodeId; 3], condition: Condition) -> Self {
+        let normal = unit(area_vector(face.map(|n| mesh.point(n))));
+        Self { place: mesh.point(face[0]), normal, condition }
+    }
+
+    /// Whether the field beyond it is the image of that of the mesh: which lies on one side of it, with no outer face of another condition
+    /// in the plane.
+    pub(super) fn is_symmetry(&self, mesh: &Mesh, conditions: &HashMap<[NodeId; 3], Condition>) -> bool {
+        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+        let mut in_plane = outer.filter(|facet| facet.nodes.iter().all(|&n| self.holds(mesh.point(n))));
+        let is_alike = |facet: &Facet| conditions.get(&face_key(facet.nodes)) == Some(&self.condition);
+        self.condition != Condition::Other
+            && !self.is_crossed(mesh.points().iter().copied())
+            && in_plane.all(is_alike)
+    }
+
     fn is_parallel(&self, other: &Self) -> bool {
         norm(beside(&[self.normal], other.normal)) <= ROUNDING
     }
@@ -179,7 +163,7 @@ impl Plane {
     }
 
     /// Whether both are the same plane, whatever their conditions.
-    fn lies_in(&self, other: &Self) -> bool {
+    pub(super) fn lies_in(&self, other: &Self) -> bool {
         self.is_parallel(other) && self.holds(other.place)
     }
 

@@ -10,15 +10,15 @@ use super::{Ascending, EdgeShape, FieldPoint, combine};
 
 /// A density at a point: its value, its derivatives by `B` and by `A + ∇ψ` (halved, as in [`super::super::density`]), and
 /// its Eshelby tensor.
-pub(super) struct Density {
-    pub(super) value: f64,
-    pub(super) by_curl: Complex3,
-    pub(super) by_potential: Complex3,
-    pub(super) tensor: [Point; 3],
+struct Density {
+    value: f64,
+    by_curl: Complex3,
+    by_potential: Complex3,
+    tensor: [Point; 3],
 }
 
 impl<const N: usize, const M: usize> EdgeShape<N, M> {
-    /// The integral of a density of `B`, by the rule that is exact for squares.
+    /// The integral of a density of `B`, by the rule that is exact for squares, whose points count alike.
     pub(crate) fn flux_integral(
         &self,
         cell: (&Tet4, &Ascending),
@@ -64,7 +64,7 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
         self.fields(self.value_rule(), tet, coefficients).map(|(share, at)| share * square(&at)).sum()
     }
 
-    pub(super) fn integrate(
+    fn integrate(
         &self,
         rule: Rule,
         (plain, tet): (&Tet4, &Ascending),

@@ -1,0 +1,147 @@
+//! The symmetry planes of a model, and what a mean over a region and its images beyond them has nothing of.
+//!
+//! A symmetry plane is a flat part of a surface with a condition of its own, which the whole mesh lies on one side of and no outer face
+//! of another condition lies in. Natural faces are none, though flux crosses them at right angles. A far wall that a region reaches
+//! counts as one: the field there is that of a device with images beyond it.
+
+use std::collections::{BTreeSet, HashMap};
+
+use fluxmorph_geometry::tet4::{FACES, Point};
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
+
+use super::mirror::{Condition, Plane, conditions};
+use crate::boundary::Boundary;
+use crate::fixed_directions::{extend, tangents};
+
+/// Planes of one named surface, at most: a surface of more of them is curved.
+const MOST_PLANES: usize = 6;
+
+/// Sine of the angle to a plane from which a direction is another one. Planes of symmetry meet at whole parts of half a turn, and those
+/// of a mesh in coordinates of six digits, or of facets, at far less.
+const INDEPENDENT: f64 = 0.05;
+
+/// The symmetry planes with their faces, on the mesh at the start.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SymmetryPlanes {
+    planes: Vec<Plane>,
+    /// The plane of every face that lies in one.
+    faces: HashMap<[NodeId; 3], usize>,
+}
+
+impl SymmetryPlanes {
+    /// Of the conditions of a model.
+    ///
+    /// # Errors
+    /// [`MeshError::UnknownSurface`].
+    pub(crate) fn new(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<Self, MeshError> {
+        let conditions = conditions(mesh.topology(), boundaries)?;
+        let mut all = Self::default();
+        for (name, _) in boundaries {
+            let surface = mesh.topology().surface(name)?;
+            let Some((planes, of_faces)) = flat_parts(mesh, surface, &conditions) else { continue };
+            let is_symmetry: Vec<bool> =
+                planes.iter().map(|plane| plane.is_symmetry(mesh, &conditions)).collect();
+            let faces = surface.iter().map(|face| face_key(*face)).zip(of_faces);
+            let kept = faces.filter(|(_, k)| is_symmetry[*k]);
+            all.faces.extend(kept.map(|(face, k)| (face, all.planes.len() + k)));
+            all.planes.extend(planes);
+        }
+        Ok(all)
+    }
+
+    /// Orthonormal directions in which a mean of `B` over some elements and their images has nothing: across flux-parallel planes in
+    /// which faces of theirs lie, and along flux-normal ones. None where that would be all directions.
+    pub(crate) fn odd_directions(
+        &self,
+        topology: &Topology,
+        elements: impl Iterator<Item = ElementId>,
+    ) -> Vec<Point> {
+        let faces = elements.flat_map(|e| {
+            let nodes = topology.tet(e);
+            FACES.map(|face| face_key(face.map(|a| nodes[a])))
+        });
+        let held: BTreeSet<usize> = faces.filter_map(|face| self.faces.get(&face).copied()).collect();
+        let mut odd = Vec::new();
+        for plane in held.into_iter().map(|k| &self.planes[k]) {
+            let (first, second) = tangents(plane.normal);
+            let directions = match plane.condition {
+                Condition::FluxParallel => vec![plane.normal],
+                Condition::FluxNormal => vec![first, second],
+                Condition::Other => Vec::new(),
+            };
+            directions.into_iter().for_each(|direction| extend(&mut odd, direction, INDEPENDENT));
+        }
+        if odd.len() < 3 { odd } else { Vec::new() }
+    }
+}
+
+/// The planes of a surface, and the number of each of its faces; `None` for a curved one.
+fn flat_parts(
+    mesh: &Mesh,
+    surface: &[[NodeId; 3]],
+    conditions: &HashMap<[NodeId; 3], Condition>,
+) -> Option<(Vec<Plane>, Vec<usize>)> {
+    let mut planes: Vec<Plane> = Vec::new();
+    let mut of_faces = Vec::with_capacity(surface.len());
+    for face in surface {
+        let plane = Plane::of(mesh, *face, conditions[&face_key(*face)]);
+        let known = planes.iter().position(|known| known.lies_in(&plane));
+        let number = known.unwrap_or_else(|| {
+            planes.push(plane);
+            planes.len() - 1
+        });
+        if planes.len() > MOST_PLANES {
+            return None;
+        }
+        of_faces.push(number);
+    }
+    Some((planes, of_faces))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use fluxmorph_geometry::RegionId;
+    use fluxmorph_geometry::generate::Grid;
+
+    use super::*;
+    use crate::boundary::UniformField;
+
+    const PARALLEL: Boundary = Boundary::FluxParallel;
+    const NORMAL: Boundary = Boundary::FluxNormal;
+
+    /// Of the cell at the origin of a grid of 27 under conditions on its sides.
+    fn odd(boundaries: &[(&str, Boundary)]) -> Vec<Point> {
+        let grid = Grid::new("grid", [(); 3].map(|()| vec![0.0, 1.0, 2.0, 3.0])).expect("ascending lines");
+        let corner = |x: Point| RegionId(u32::from(x.iter().all(|c| *c < 1.0)));
+        let topology = grid.topology(&["rest", "corner"], corner).expect("a grid conforms");
+        let cell = topology.elements_of(RegionId(1));
+        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("cells have a volume");
+        let boundaries: Vec<(String, Boundary)> =
+            boundaries.iter().map(|(name, boundary)| ((*name).to_owned(), *boundary)).collect();
+        let planes = SymmetryPlanes::new(&mesh, &boundaries).expect("sides of the grid");
+        planes.odd_directions(mesh.topology(), cell.into_iter())
+    }
+
+    #[test]
+    fn the_mean_of_a_corner_has_what_its_images_leave() {
+        let [x, y, z] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let along = |found: &[Point], axis: Point| {
+            found
+                .iter()
+                .any(|direction| (0..3).map(|d| direction[d] * axis[d]).sum::<f64>().abs() > 1.0 - 1e-12)
+        };
+        let found = odd(&[("x_min", PARALLEL), ("x_max", PARALLEL), ("y_max", PARALLEL)]);
+        assert!(found.len() == 1 && along(&found, x), "the corner reaches one of them: {found:?}");
+        let found = odd(&[("z_min", NORMAL)]);
+        assert!(found.len() == 2 && along(&found, x) && along(&found, y), "{found:?}");
+        let found = odd(&[("x_min", PARALLEL), ("z_min", NORMAL)]);
+        assert!(found.len() == 2 && !along(&found, z), "{found:?}");
+        let field = UniformField { flux_density: z, centre: None };
+        assert!(odd(&[("x_min", Boundary::UniformField(field))]).is_empty());
+        let all = [("x_min", PARALLEL), ("y_min", PARALLEL), ("z_min", PARALLEL)];
+        assert!(odd(&all).is_empty(), "no mean is left: that of the part");
+    }
+}
