@@ -28,7 +28,7 @@ pub(crate) fn peak(config: &Config, setup: &Setup) -> Result<usize, Error> {
         return Ok(peak);
     }
     if (config.analysis.elements, config.analysis.order) == (Elements::Nodal, ElementOrder::Linear) {
-        peak = peak.max(EDGE_OVER_NODAL * sizes.here());
+        peak = peak.max((EDGE_OVER_NODAL - 1) * sizes.of_one_state() + sizes.here());
     }
     let check = match FreshMesh::of(config, problem) {
         Some(fresh) => fresh.memory()[1],

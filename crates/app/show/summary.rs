@@ -20,7 +20,7 @@ pub(super) struct Named {
     name: String,
     /// Behind a value, with a blank before it; empty where terms of several units are added.
     unit: String,
-    /// Whether no field has a say in it, and no other mesh an opinion.
+    /// Whether no field has a say in it: another mesh has an opinion of its constraints alone.
     is_of_shape: bool,
     /// What is limited.
     constraints: Vec<Constraint>,

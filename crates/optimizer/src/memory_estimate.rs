@@ -116,7 +116,12 @@ impl Sizes {
 
     /// Bytes that the process holds at the peak of one evaluation, about.
     pub fn here(&self) -> usize {
-        PROCESS + self.arrays + self.further_states + self.matrices + self.preconditioners
+        self.of_one_state() + self.further_states
+    }
+
+    /// The same with one load case or frequency.
+    pub fn of_one_state(&self) -> usize {
+        PROCESS + self.arrays + self.matrices + self.preconditioners
     }
 
     /// Bytes that the process holds while it works on something else that takes so many for each element, and so many more for
