@@ -24,8 +24,8 @@ const CHUNK: usize = 8192;
 /// The integral of a density.
 #[derive(Clone, Debug)]
 pub enum Integral {
-    /// `½∫ν|B − B_r|²` [J] in statics, `∫w(|B|)` where there is a B–H law; `¼∫ν|B|²`, or half the mean of `w` at the largest and the least `|B|` of a period, in
-    /// harmonics, over these elements, ascending.
+    /// `½∫ν|B − B_r|²` [J] in statics, `∫w(|B|)` where there is a B–H law; in harmonics `¼∫ν|B|²`, and of a law the mean of `w` at the
+    /// largest and the least `|B|` of a period; over these elements, ascending.
     Energy(Vec<ElementId>),
     /// `½∫σ|E|²` [W] over these elements, ascending.
     VolumeLoss(Vec<ElementId>),
