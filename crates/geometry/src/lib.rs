@@ -10,6 +10,7 @@ pub mod box_tree;
 pub mod depth;
 #[cfg(test)]
 mod determinism;
+pub mod directions;
 pub mod disjoint_sets;
 pub mod error;
 mod facets;

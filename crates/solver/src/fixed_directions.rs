@@ -10,7 +10,8 @@
 //! plane meets it, in the mean normal of the faces on one side, not quite at right angles: its normal is turned into the
 //! plane there.
 
-use fluxmorph_geometry::tet4::{Point, cross, dot, norm};
+use fluxmorph_geometry::directions::{extend, unit};
+use fluxmorph_geometry::tet4::{Point, cross, dot};
 
 /// Angle between faces above which they are two surfaces: finer than the facets of any sensible mesh of a curved
 /// surface, coarser than a corner.
@@ -109,12 +110,6 @@ fn smooth_surfaces(faces: &[(Fix, Point)]) -> Vec<(Fix, Point)> {
     sums.into_iter().map(|(fix, sum)| (fix, unit(sum))).collect()
 }
 
-/// A vector with the length 1.
-pub(crate) fn unit(v: Point) -> Point {
-    let length = norm(v);
-    v.map(|c| c / length)
-}
-
 /// The coordinate axis that a unit vector is along.
 pub(crate) fn axis_of(normal: Point) -> Option<usize> {
     (0..3).find(|&axis| (0..3).all(|d| d == axis || normal[d].abs() <= AXIS_TOLERANCE))
@@ -127,22 +122,6 @@ pub(crate) fn tangents(normal: Point) -> (Point, Point) {
     let part = dot(start, normal);
     let first = unit(std::array::from_fn(|d| start[d] - part * normal[d]));
     (first, cross(normal, first))
-}
-
-/// What a vector has beside orthonormal directions.
-pub(crate) fn beside(directions: &[Point], vector: Point) -> Point {
-    directions.iter().fold(vector, |rest, direction| {
-        let along = dot(*direction, rest);
-        std::array::from_fn(|d| rest[d] - along * direction[d])
-    })
-}
-
-/// Adds what a unit vector has beside an orthonormal set, where that is longer than `least` [1].
-pub(crate) fn extend(basis: &mut Vec<Point>, vector: Point, least: f64) {
-    let rest = beside(basis, vector);
-    if norm(rest) > least {
-        basis.push(unit(rest));
-    }
 }
 
 /// The frame whose first directions are the fixed ones; the coordinate axes where these span the same.

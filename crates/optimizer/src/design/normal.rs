@@ -8,7 +8,8 @@
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
+use fluxmorph_geometry::directions::{beside, extend, unit};
+use fluxmorph_geometry::tet4::{Point, area_vector, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId};
 
@@ -44,52 +45,29 @@ pub(super) fn directions(
         }
     }
     let own: BTreeSet<[NodeId; 3]> = triangles.iter().copied().map(face_key).collect();
-    let mut planes = vec![Planes::default(); nodes.len()];
+    let mut planes = vec![Vec::new(); nodes.len()];
     for triangle in kept.iter().filter(|t| !own.contains(&face_key(**t))) {
         let area = vector(triangle);
         for i in triangle.iter().filter_map(row) {
-            planes[i].add(area.map(|a| a / norm(area)));
+            add_plane(&mut planes[i], unit(area));
         }
     }
     sums.iter()
         .zip(&areas)
         .zip(&planes)
         .map(|((&sum, &area), planes)| {
-            let within = planes.project(sum);
+            let within = beside(planes, sum);
             let length = norm(within);
             if length > SHORTEST * area { within.map(|c| c / length) } else { [0.0; 3] }
         })
         .collect()
 }
 
-/// Orthonormal span of the normals of the planes through a node.
-#[derive(Clone, Default)]
-struct Planes(Vec<Point>);
-
-impl Planes {
-    fn add(&mut self, normal: Point) {
-        // A plane of constant coordinate has exactly that normal, whatever the rounding of its triangles.
-        let axis = super::dominant_axis(normal);
-        let flat = (0..3).all(|d| d == axis || normal[d].abs() < FLAT);
-        let normal = if flat { std::array::from_fn(|d| f64::from(d == axis)) } else { normal };
-        let rest = self.project(normal);
-        let length = norm(rest);
-        if length > SAME_PLANE {
-            self.0.push(rest.map(|c| c / length));
-        }
-    }
-
-    /// The part of a vector within all the planes.
-    fn project(&self, mut vector: Point) -> Point {
-        if self.0.len() == 3 {
-            return [0.0; 3];
-        }
-        for normal in &self.0 {
-            let across = dot(vector, *normal);
-            for (c, n) in vector.iter_mut().zip(normal) {
-                *c -= across * n;
-            }
-        }
-        vector
-    }
+/// Adds the normal of a plane through a node to the orthonormal span of those before.
+fn add_plane(planes: &mut Vec<Point>, normal: Point) {
+    // A plane of constant coordinate has exactly that normal, whatever the rounding of its triangles.
+    let axis = super::dominant_axis(normal);
+    let flat = (0..3).all(|d| d == axis || normal[d].abs() < FLAT);
+    let normal = if flat { std::array::from_fn(|d| f64::from(d == axis)) } else { normal };
+    extend(planes, normal, SAME_PLANE);
 }

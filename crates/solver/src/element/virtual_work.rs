@@ -20,7 +20,7 @@ type Tensor = [Point; 3];
 
 /// The tensor with some entries.
 #[inline]
-fn tensor(entry: impl Fn(usize, usize) -> f64) -> Tensor {
+pub(super) fn tensor(entry: impl Fn(usize, usize) -> f64) -> Tensor {
     std::array::from_fn(|d| std::array::from_fn(|i| entry(d, i)))
 }
 

@@ -8,6 +8,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fluxmorph_geometry::directions::{beside, extend};
 use fluxmorph_geometry::tet4::{Point, cross, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
@@ -18,7 +19,6 @@ use crate::coil::CoilShape;
 use crate::element::virtual_work::VirtualWork;
 use crate::error::SolverError;
 use crate::family::LocalIntegral;
-use crate::fixed_directions::{beside, extend};
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
 

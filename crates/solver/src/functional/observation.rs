@@ -293,7 +293,7 @@ impl Observation {
     fn odd_directions(&self, model: &FieldModel) -> Vec<Point> {
         match self.observed {
             Observed::Homogeneity { of: Compared::Vector, .. } => {
-                model.symmetry_planes().odd_directions(model.topology(), self.elements())
+                model.walls().symmetry_planes().odd_directions(model.topology(), self.elements())
             }
             _ => Vec::new(),
         }

@@ -14,7 +14,7 @@ use crate::error::SolverError;
 use crate::linear::{FieldKind, SystemAnalysis, SystemPattern};
 use crate::load::Sources;
 use crate::load_case::LoadCase;
-use crate::recovery::{SymmetryPlanes, Walls};
+use crate::recovery::Walls;
 use crate::setup::{self, FieldModelSetup};
 use crate::weak_form::WeakForm;
 
@@ -55,8 +55,7 @@ impl FieldModel {
         let conductors = weak_form.conductors();
         solids::check(mesh, &setup.coils, (&conductors, &setup.materials), &setup.boundaries)?;
         let gradients: &[_] = if setup.family == ElementFamily::Nodal { &conductors.surface } else { &[] };
-        let walls = Walls::new(mesh.topology(), &setup.boundaries, gradients)?;
-        let symmetry = SymmetryPlanes::new(mesh, &setup.boundaries)?;
+        let walls = Walls::new(mesh, &setup.boundaries, gradients)?;
         // The net current of a solid conductor is given: no other returns through it.
         let conductors = conductors.without(&solids::elements(&setup.coils));
         let mut joined = conductors.joined(mesh, &setup.boundaries)?;
@@ -65,8 +64,7 @@ impl FieldModel {
         if let Some(shell) = weak_form.shell() {
             setup::check_open(shell, mesh, &setup, sources.coil_elements())?;
         }
-        let shared =
-            Arc::new(SharedParts { fine, solids, walls, symmetry, analysis: analysis.map(Arc::new) });
+        let shared = Arc::new(SharedParts { fine, solids, walls, analysis: analysis.map(Arc::new) });
         let (setup, weak_form) = (Arc::new(setup), Arc::new(weak_form));
         let (sources, windings) = (Arc::new(sources), Arc::new(windings));
         let model =

@@ -24,7 +24,7 @@ use crate::linear::{FieldSystem, LinearSolverCache, LocalSystem, PreparedSystem,
 use crate::load::Sources;
 use crate::material::Material;
 use crate::open::Shell;
-use crate::recovery::{SymmetryPlanes, Walls};
+use crate::recovery::Walls;
 use crate::setup::FieldModelSetup;
 use crate::space::Space;
 use crate::surface::{Conductor, SurfaceTerm};
@@ -53,7 +53,6 @@ struct SharedParts {
     fine: Discretisation,
     solids: Solids,
     walls: Walls,
-    symmetry: SymmetryPlanes,
     /// Of one process.
     analysis: Option<Arc<SystemAnalysis>>,
 }
@@ -324,10 +323,6 @@ impl FieldModel {
 
     pub(crate) fn walls(&self) -> &Walls {
         &self.shared.walls
-    }
-
-    pub(crate) fn symmetry_planes(&self) -> &SymmetryPlanes {
-        &self.shared.symmetry
     }
 
     pub(crate) fn sources(&self) -> &Sources {

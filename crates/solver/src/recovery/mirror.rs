@@ -1,22 +1,18 @@
 //! Mirror images of elements beyond the symmetry planes of a model, by which a patch goes on there as in the whole device.
 //!
-//! At a flux-parallel plane with the unit normal `n` the field of the image is `B(Rx) = RB(x)` with `R = 1 − 2nnᵀ`, at a
-//! flux-normal one `−RB(x)`; the potential has the other sign. Planes at right angles to each other are taken, with the images of
-//! images. A patch ends at all other outer faces, and at a plane in which a part of them lies or which elements lie behind.
+//! The field of an image is that of `plane`; the potential has the other sign. Planes at right angles to each other are taken, with
+//! the images of images. A patch ends at all other outer faces, and at a plane in which a part of them lies or which elements lie behind.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
 
+use super::plane::{Condition, Plane, ROUNDING, conditions};
+use super::symmetry::SymmetryPlanes;
 use crate::boundary::Boundary;
-use crate::fixed_directions::{beside, unit};
 use crate::model::FieldModel;
-
-/// Sine of an angle up to which directions count as one, and share of the way to a point by which it may lie off a plane: faces
-/// of a fine mesh with coordinates of six digits have directions of their own.
-const ROUNDING: f64 = 1e-3;
 
 /// Layers of elements around the start of a patch after which no fit is tried.
 const LAYERS_LIMIT: usize = 3;
@@ -26,24 +22,7 @@ const LAYERS_LIMIT: usize = 3;
 pub(crate) struct Walls {
     /// Ascending by node.
     faces: Vec<(NodeId, [NodeId; 3], Condition)>,
-}
-
-/// What holds on a face.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Condition {
-    FluxParallel,
-    FluxNormal,
-    /// Anything else: `A` is given, is a gradient along the face, or free.
-    Other,
-}
-
-/// A symmetry plane.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
-    place: Point,
-    /// Of unit length.
-    pub(super) normal: Point,
-    pub(super) condition: Condition,
+    symmetry: SymmetryPlanes,
 }
 
 /// Which planes an image is beyond, a bit each; the element itself where it is zero.
@@ -65,11 +44,13 @@ impl Walls {
     /// # Errors
     /// [`MeshError::UnknownSurface`].
     pub(crate) fn new(
-        topology: &Topology,
+        mesh: &Mesh,
         boundaries: &[(String, Boundary)],
         gradients: &[[NodeId; 3]],
     ) -> Result<Self, MeshError> {
+        let topology = mesh.topology();
         let mut conditions = conditions(topology, boundaries)?;
+        let symmetry = SymmetryPlanes::new(mesh, boundaries, &conditions)?;
         conditions.extend(gradients.iter().map(|face| (face_key(*face), Condition::Other)));
         let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
         let of_face = |facet: &Facet| {
@@ -78,7 +59,11 @@ impl Walls {
         };
         let mut faces: Vec<_> = outer.flat_map(of_face).collect();
         faces.sort_unstable();
-        Ok(Self { faces })
+        Ok(Self { faces, symmetry })
+    }
+
+    pub(crate) fn symmetry_planes(&self) -> &SymmetryPlanes {
+        &self.symmetry
     }
 
     /// The planes of the outer faces at a node that are at right angles to each other; one with a part of another condition, or with
@@ -101,95 +86,6 @@ impl Walls {
             }
         }
         planes
-    }
-}
-
-/// The condition of every face of the named surfaces, by its key; of one that has two of them [`Condition::Other`].
-///
-/// # Errors
-/// [`MeshError::UnknownSurface`].
-pub(super) fn conditions(
-    topology: &Topology,
-    boundaries: &[(String, Boundary)],
-) -> Result<HashMap<[NodeId; 3], Condition>, MeshError> {
-    let mut conditions = HashMap::new();
-    for (name, boundary) in boundaries {
-        let condition = match boundary {
-            Boundary::FluxParallel => Condition::FluxParallel,
-            Boundary::FluxNormal => Condition::FluxNormal,
-            Boundary::UniformField(_) => Condition::Other,
-        };
-        for face in topology.surface(name)? {
-            let known = conditions.entry(face_key(*face)).or_insert(condition);
-            *known = if *known == condition { condition } else { Condition::Other };
-        }
-    }
-    Ok(conditions)
-}
-
-impl Plane {
-    /// That of a face.
-    pub(super) fn of(mesh: &Mesh, face: [NodeId; 3], condition: Condition) -> Self {
-        let normal = unit(area_vector(face.map(|n| mesh.point(n))));
-        Self { place: mesh.point(face[0]), normal, condition }
-    }
-
-    /// Whether the field beyond it is the image of that of the mesh: which lies on one side of it, with no outer face of another condition
-    /// in the plane.
-    pub(super) fn is_symmetry(&self, mesh: &Mesh, conditions: &HashMap<[NodeId; 3], Condition>) -> bool {
-        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-        let mut in_plane = outer.filter(|facet| facet.nodes.iter().all(|&n| self.holds(mesh.point(n))));
-        let is_alike = |facet: &Facet| conditions.get(&face_key(facet.nodes)) == Some(&self.condition);
-        self.condition != Condition::Other
-            && !self.is_crossed(mesh.points().iter().copied())
-            && in_plane.all(is_alike)
-    }
-
-    fn is_parallel(&self, other: &Self) -> bool {
-        norm(beside(&[self.normal], other.normal)) <= ROUNDING
-    }
-
-    fn is_square_to(&self, other: &Self) -> bool {
-        dot(self.normal, other.normal).abs() <= ROUNDING
-    }
-
-    /// How far a point lies off it on the side of the normal [m].
-    fn height(&self, x: Point) -> f64 {
-        dot(self.normal, sub(x, self.place))
-    }
-
-    fn holds(&self, x: Point) -> bool {
-        self.height(x).abs() <= ROUNDING * norm(sub(x, self.place))
-    }
-
-    /// Whether both are the same plane, whatever their conditions.
-    pub(super) fn lies_in(&self, other: &Self) -> bool {
-        self.is_parallel(other) && self.holds(other.place)
-    }
-
-    /// Whether points lie on both sides of it.
-    fn is_crossed(&self, points: impl Iterator<Item = Point>) -> bool {
-        let mut sides = points.filter(|&x| !self.holds(x)).map(|x| self.height(x) > 0.0);
-        let first = sides.next();
-        sides.any(|side| Some(side) != first)
-    }
-
-    /// `Rv`.
-    fn reflect(&self, v: Point) -> Point {
-        let twice = 2.0 * dot(self.normal, v);
-        std::array::from_fn(|d| v[d] - twice * self.normal[d])
-    }
-
-    /// `B` at the image of where it is `b`.
-    fn turn(&self, b: Point) -> Point {
-        let reflected = self.reflect(b);
-        if self.condition == Condition::FluxNormal { reflected.map(|c| -c) } else { reflected }
-    }
-
-    /// The same, at right angles to others to the last digit: reflections then commute.
-    fn squared_to(self, others: &[Self]) -> Self {
-        let normals: Vec<Point> = others.iter().map(|other| other.normal).collect();
-        Self { normal: unit(beside(&normals, self.normal)), ..self }
     }
 }
 

@@ -18,6 +18,7 @@
 mod fit;
 mod mirror;
 mod places;
+mod plane;
 mod symmetry;
 
 use std::collections::BTreeSet;
@@ -39,7 +40,6 @@ use fit::Fit;
 pub(crate) use mirror::Walls;
 use mirror::{Image, Mirrors};
 pub(crate) use places::{BlendedField, FixedPlaces};
-pub(crate) use symmetry::SymmetryPlanes;
 
 /// How fast the weight of a node falls, and that of a point within an element ([`Fit::new`]): most nodes lie on the rim of a patch,
 /// and where it lies to one side of the point, values of `B` far from it keep a fit from swinging there. Of the values from

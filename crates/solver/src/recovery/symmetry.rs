@@ -6,13 +6,14 @@
 
 use std::collections::{BTreeSet, HashMap};
 
+use fluxmorph_geometry::directions::extend;
 use fluxmorph_geometry::tet4::{FACES, Point};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 
-use super::mirror::{Condition, Plane, conditions};
+use super::plane::{Condition, Plane};
 use crate::boundary::Boundary;
-use crate::fixed_directions::{extend, tangents};
+use crate::fixed_directions::tangents;
 
 /// Planes of one named surface, at most: a surface of more of them is curved.
 const MOST_PLANES: usize = 6;
@@ -30,18 +31,21 @@ pub(crate) struct SymmetryPlanes {
 }
 
 impl SymmetryPlanes {
-    /// Of the conditions of a model.
+    /// Of the conditions of a model, by surface and by the key of a face.
     ///
     /// # Errors
     /// [`MeshError::UnknownSurface`].
-    pub(crate) fn new(mesh: &Mesh, boundaries: &[(String, Boundary)]) -> Result<Self, MeshError> {
-        let conditions = conditions(mesh.topology(), boundaries)?;
+    pub(super) fn new(
+        mesh: &Mesh,
+        boundaries: &[(String, Boundary)],
+        conditions: &HashMap<[NodeId; 3], Condition>,
+    ) -> Result<Self, MeshError> {
         let mut all = Self::default();
         for (name, _) in boundaries {
             let surface = mesh.topology().surface(name)?;
-            let Some((planes, of_faces)) = flat_parts(mesh, surface, &conditions) else { continue };
+            let Some((planes, of_faces)) = flat_parts(mesh, surface, conditions) else { continue };
             let is_symmetry: Vec<bool> =
-                planes.iter().map(|plane| plane.is_symmetry(mesh, &conditions)).collect();
+                planes.iter().map(|plane| plane.is_symmetry(mesh, conditions)).collect();
             let faces = surface.iter().map(|face| face_key(*face)).zip(of_faces);
             let kept = faces.filter(|(_, k)| is_symmetry[*k]);
             all.faces.extend(kept.map(|(face, k)| (face, all.planes.len() + k)));
@@ -106,6 +110,7 @@ mod tests {
     use fluxmorph_geometry::RegionId;
     use fluxmorph_geometry::generate::Grid;
 
+    use super::super::plane::conditions;
     use super::*;
     use crate::boundary::UniformField;
 
@@ -121,7 +126,8 @@ mod tests {
         let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("cells have a volume");
         let boundaries: Vec<(String, Boundary)> =
             boundaries.iter().map(|(name, boundary)| ((*name).to_owned(), *boundary)).collect();
-        let planes = SymmetryPlanes::new(&mesh, &boundaries).expect("sides of the grid");
+        let conditions = conditions(mesh.topology(), &boundaries).expect("sides of the grid");
+        let planes = SymmetryPlanes::new(&mesh, &boundaries, &conditions).expect("sides of the grid");
         planes.odd_directions(mesh.topology(), cell.into_iter())
     }
 

@@ -6,6 +6,7 @@ use fluxmorph_geometry::tet4::{Point, Tet4};
 use super::super::Complex3;
 use super::super::density::{ElementIntegral, OfFlux};
 use super::super::tabulated::Rule;
+use super::super::virtual_work::tensor;
 use super::{Ascending, EdgeShape, FieldPoint, combine};
 
 /// A density at a point: its value, its derivatives by `B` and by `A + ∇ψ` (halved, as in [`super::super::density`]), and
@@ -95,10 +96,6 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
             .map(|g| std::array::from_fn(|d| plain.volume * (0..3).map(|i| sum[d][i] * g[i]).sum::<f64>()));
         integral
     }
-}
-
-fn tensor(entry: impl Fn(usize, usize) -> f64) -> [Point; 3] {
-    std::array::from_fn(|d| std::array::from_fn(|i| entry(d, i)))
 }
 
 #[cfg(test)]
