@@ -5,8 +5,9 @@ use fluxmorph::config::{Algorithm, Optimizer};
 use fluxmorph::files::{RunResult, system_disk};
 use fluxmorph::run;
 use fluxmorph::show::{Evaluation, Silent};
-use fluxmorph_optimizer::driver::{Optimised, StopReason, optimise};
-use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_optimizer::Error;
+use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, StopReason, optimise};
+use fluxmorph_optimizer::problem::{Analysis, Problem};
 
 use crate::problems::{Rows, analysed, initial, objective, optimised};
 use crate::support::folder::RunFolder;
@@ -90,6 +91,52 @@ fn the_lightest_plate_for_a_field_is_the_best_one_for_its_mass() {
     let mass = lightest.best.objective;
     println!("{mass:.5} kg of 2.5 after {} evaluations, F {:.6e}", rows.len(), measured(&lightest, 0));
     assert!(lightest.best.violation == 0.0 && (mass / 2.5 - 1.0).abs() < 2e-3, "{mass}");
+}
+
+/// What a run has recorded, given back to the next one.
+#[derive(Default)]
+struct Tape {
+    written: Vec<Record>,
+    played: usize,
+}
+
+impl Recorder for Tape {
+    fn replay(&mut self, _: usize) -> Option<Record> {
+        self.played += 1;
+        self.written.get(self.played - 1).cloned()
+    }
+
+    fn record(&mut self, record: &Record, _: &Analysis, _: &Problem) -> Result<(), Error> {
+        self.written.push(record.clone());
+        Ok(())
+    }
+}
+
+/// All that the method has found in eight evaluations is a little beyond the bound: the last of them is spent on a step back, which
+/// keeps it. A resumed run with more of them goes on from there.
+#[test]
+fn what_is_beyond_a_bound_by_little_is_taken_a_step_back() {
+    let (mut problem, own) = changed("busbar.toml", &[]);
+    let mut tape = Tape::default();
+    let mut run = |tape: &mut Tape, max_evaluations: usize| {
+        let settings = Optimizer { algorithm: Algorithm::Slsqp, max_evaluations, ..own.clone() };
+        let run = optimise(&mut problem, &settings.settings(), &mut Silent, tape, &|| false);
+        let run = run.unwrap_or_else(|e| panic!("{e}"));
+        println!("{} evaluations: F/F0 {:.5}", run.evaluations, run.best.objective / run.initial);
+        assert_eq!(run.best.violation, 0.0);
+        (run.best.objective / run.initial, run.evaluations)
+    };
+    let (kept, evaluations) = run(&mut tape, 8);
+    assert_eq!(evaluations, 8);
+    let steps: Vec<bool> = tape.written.iter().map(|record| record.stepped_back).collect();
+    assert_eq!(steps, [false, false, false, false, false, false, false, true]);
+    let best = &tape.written[7];
+    let others = tape.written[1..7].iter().filter(|own| own.row.constraints["c_volume_bar"] <= 1e-6);
+    assert!(best.improved && kept < 0.94 && others.count() == 0, "{kept}");
+
+    let mut resumed = Tape { written: tape.written.clone(), played: 0 };
+    let (further, evaluations) = run(&mut resumed, 12);
+    assert!(further <= kept && evaluations > 8 && resumed.written[..8] == tape.written[..]);
 }
 
 #[test]

@@ -36,6 +36,7 @@ pub(super) fn record(number: usize) -> Record {
             ..Evaluation::default()
         },
         improved: number.is_multiple_of(2),
+        stepped_back: number.is_multiple_of(3),
         design: vec![x, -0.0, f64::MIN_POSITIVE],
         gradient: vec![1.0 / 3.0, x, -x],
         constraints: vec![(x, vec![0.1, 0.2, 0.3])],

@@ -28,8 +28,12 @@ impl Run<'_> {
     /// know of it (`carry`).
     pub(super) fn evaluate(&mut self, p: &[f64]) -> Result<Sample, Stop> {
         // Before the motion, and not behind it: what a signal finds begun is finished.
-        if self.known(p).is_none() && !self.is_replaying() {
-            self.check_limits()?;
+        if self.known(p).is_none() {
+            if self.is_replaying() {
+                self.check_replay()?;
+            } else {
+                self.check_limits()?;
+            }
         }
         let mut carried = self.carry(p)?;
         let before =
@@ -228,6 +232,7 @@ impl Run<'_> {
         Record {
             row,
             improved: false,
+            stepped_back: self.is_stepping_back,
             design: p.to_vec(),
             gradient,
             constraints: analysis.constraints.iter().map(constraint).collect(),

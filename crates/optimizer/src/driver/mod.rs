@@ -13,6 +13,8 @@
 //!   convergence.
 //! * Where the method ends and no design keeps all constraints, the worst of them is minimised until one does; then the method goes
 //!   on from there. Where none does the run ends with the least violation.
+//! * Where the method ends, or one evaluation is left, and the best design found is beyond a bound by little, it is evaluated a step
+//!   back within its bounds (`near_miss`).
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
@@ -25,6 +27,7 @@ mod carry;
 mod compute;
 mod evaluation;
 mod incumbent;
+mod near_miss;
 mod observer;
 mod outcome;
 mod promised_gain;
@@ -115,7 +118,11 @@ fn search(run: &mut Run<'_>, settings: &Settings) -> Result<StopReason, Error> {
 fn advance(search: &mut Search<'_>, run: &mut Run<'_>) -> Result<Option<StopReason>, Error> {
     let ended = search.minimise(run);
     match search.decide(run, ended)? {
-        NextStep::Stop(reason) => return Ok(Some(reason)),
+        NextStep::Stop(reason) => {
+            let reason = run.step_back(reason)?;
+            search.move_trust_region(run);
+            return Ok(reason);
+        }
         NextStep::SearchOn => {}
         NextStep::Restore => search.restore(run),
         NextStep::TightenTolerance => search.tighten_tolerance(run),

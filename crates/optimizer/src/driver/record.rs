@@ -13,6 +13,9 @@ pub struct Record {
     pub row: Evaluation,
     /// Whether it was the best until then.
     pub improved: bool,
+    /// Whether the driver asked for it and no method: a step back within the bounds.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub stepped_back: bool,
     /// The design variables [m].
     pub design: Vec<f64>,
     /// dF/dp [unit of F per m].

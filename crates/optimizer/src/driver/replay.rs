@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::incumbent::{BestField, Incumbent};
 use super::run::Run;
 use super::stop::Stop;
-use super::{Best, Record};
+use super::{Best, Record, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;
 use crate::problem::{Derivatives, NoProgress, SolverCache};
@@ -25,6 +25,15 @@ impl Run<'_> {
             return follows && pairs().all(|(was, is)| (was - is).abs() <= CLOSE * largest);
         }
         follows && pairs().all(|(was, is)| was.to_bits() == is.to_bits())
+    }
+
+    /// Ends a search where the run had come to its last evaluation, which a step back took, and now may be allowed more.
+    pub(super) fn check_replay(&self) -> Result<(), Stop> {
+        let took_it = self.next.as_ref().is_some_and(|record| record.stepped_back);
+        if took_it && !self.is_stepping_back {
+            return Err(Stop::Limit(StopReason::MaxEvaluations));
+        }
+        Ok(())
     }
 
     /// Why a record is not the answer to what the method asks for.

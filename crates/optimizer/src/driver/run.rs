@@ -4,26 +4,14 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial};
+use super::near_miss::NearMiss;
 use super::promised_gain::promised_gain;
 use super::stop::Stop;
-use super::{Best, Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
+use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
 use crate::error::Error;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::{Combination, Goal};
 use crate::problem::{Problem, Shape, SolverCache, Timings};
-
-/// Relative excess over a bound up to which a better design is reported: few bounds are meant more exactly, and few meshes are
-/// that exact.
-const NEAR: f64 = 1e-3;
-
-/// A design that is beyond a bound by little.
-#[derive(Clone, Copy, Debug)]
-struct NearMiss {
-    evaluation: usize,
-    objective: f64,
-    /// The constraint, and its excess relative to its bound.
-    worst: (usize, f64),
-}
 
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
@@ -57,8 +45,10 @@ pub(super) struct Run<'a> {
     timings: Timings,
     /// What the gradient promised at the first design.
     promised: Option<f64>,
-    /// Designs beyond their worst bound by at most [`NEAR`].
-    near_misses: Vec<NearMiss>,
+    /// Designs beyond a bound by little, in the order of their evaluations.
+    pub(super) near_misses: Vec<NearMiss>,
+    /// Whether one of them is evaluated a step back.
+    pub(super) is_stepping_back: bool,
     /// Times the mesh has been refined.
     pub(super) level: usize,
     /// Evaluations on coarser meshes.
@@ -102,6 +92,7 @@ impl<'a> Run<'a> {
             timings: Timings::default(),
             promised: None,
             near_misses: Vec::new(),
+            is_stepping_back: false,
             level: 0,
             first_evaluation: 0,
             is_shared_out,
@@ -192,7 +183,12 @@ impl<'a> Run<'a> {
     pub(super) fn check_limits(&mut self) -> Result<(), Stop> {
         let reason = match self.limit_reached() {
             Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
-            _ if self.evaluations >= self.settings.max_evaluations => Some(StopReason::MaxEvaluations),
+            // The last one is for a step back within the bounds.
+            _ if self.evaluations + usize::from(!self.is_stepping_back && self.has_missed())
+                >= self.settings.max_evaluations =>
+            {
+                Some(StopReason::MaxEvaluations)
+            }
             reason => reason,
         };
         reason.map_or(Ok(()), |reason| Err(Stop::Limit(reason)))
@@ -224,15 +220,7 @@ impl<'a> Run<'a> {
         }
         self.latest = Some(sample.clone());
         self.repeated = 0;
-        let excesses = sample.constraints[..self.constraint_count()].iter().map(|(excess, _)| *excess);
-        let worst = excesses.enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
-        // Not where the room of the mesh is what is missing.
-        let is_near =
-            |excess: f64| excess > CONSTRAINT_TOLERANCE && excess <= NEAR && excess == sample.violation();
-        if let Some(worst) = worst.filter(|(_, excess)| is_near(*excess)) {
-            let (evaluation, objective) = (record.row.evaluation, record.row.objective);
-            self.near_misses.push(NearMiss { evaluation, objective, worst });
-        }
+        self.near_misses.extend(NearMiss::of(&record, &sample));
         if comparison.is_improved() {
             self.best = Some(Incumbent {
                 evaluation: record.row.evaluation,
@@ -273,15 +261,6 @@ impl<'a> Run<'a> {
         Ok(reason)
     }
 
-    /// The design nearest to its bounds of those that gain far more on a best one within them than their excess.
-    fn missed_by(&self, best: &Best) -> Option<NearMiss> {
-        let gain =
-            |missed: &NearMiss| self.goal.sign() * (best.objective - missed.objective) / best.objective.abs();
-        let is_worth_it = |missed: &&NearMiss| gain(missed) > NEAR.max(100.0 * missed.worst.1);
-        let misses = self.near_misses.iter().filter(|_| best.violation == 0.0).filter(is_worth_it);
-        misses.min_by(|a, b| a.worst.1.total_cmp(&b.worst.1)).copied()
-    }
-
     /// The outcome, with the field of the best design.
     pub(super) fn finish(mut self, stop_reason: StopReason) -> Result<Optimised, Error> {
         let is_cut = stop_reason == StopReason::Interrupted && (self.is_replaying() || self.best.is_none());
@@ -292,6 +271,7 @@ impl<'a> Run<'a> {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }
+        let missed = self.missed().map(|miss| (miss.evaluation, miss.objective, miss.worst));
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };
@@ -308,14 +288,11 @@ impl<'a> Run<'a> {
                 names.join(", of ")
             ));
         }
-        if let Some(missed) = self.missed_by(&best) {
-            let (k, excess) = missed.worst;
+        if let Some((evaluation, objective, (k, excess))) = missed {
             warnings.push(format!(
-                "evaluation {} has an objective of {:.6e}, against {:.6e} of the best design, and does not count: it is \
+                "evaluation {evaluation} has an objective of {objective:.6e}, against {:.6e} of the best design, and does not count: it is \
                  beyond the bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
                  method of those that take constraints",
-                missed.evaluation,
-                missed.objective,
                 best.objective,
                 self.problem.constraints()[k].name
             ));
