@@ -177,6 +177,64 @@ fn multipoles_are_those_of_a_fit_of_probes() {
 
 /// The two tests of a transformer in one analysis: what its terminals see under each load is what the circuit of its inductances
 /// says, the leakage of a short-circuited secondary and the voltage of an open one.
+/// A bar of sea water between walls.
+const WEAK_BAR: &str = r#"
+[mesh]
+generator = "boxes"
+
+[mesh.boxes]
+box = [["0 mm", "0 mm", "0 mm"], ["60 mm", "60 mm", "20 mm"]]
+growth = 1.8
+
+[[mesh.boxes.regions]]
+name = "bar"
+box = [["20 mm", "20 mm", "0 mm"], ["30 mm", "30 mm", "20 mm"]]
+size = ["5 mm", "5 mm", "20 mm"]
+
+[analysis]
+elements = "edge"
+frequencies = [0, 5, 1e6]
+
+[materials.water]
+conductivity = "5 S/m"
+
+[regions.bar]
+material = "water"
+
+[[coils]]
+name = "bar"
+region = "bar"
+conductor = "solid"
+terminals = ["z_min", "z_max"]
+ampere_turns = "100 A"
+
+[boundaries]
+flux_parallel = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
+"#;
+
+/// The skin is metres deep: resistance and inductance are those at 0 Hz, though the reactance is 2e-7 of the impedance at 5 Hz, and
+/// rounding of the curl in the driving field would be a hundred times that.
+#[test]
+fn a_weak_solid_conductor_has_its_inductance_at_every_frequency() {
+    let home = folder();
+    let config = home.path().join("bar.toml");
+    std::fs::write(&config, WEAK_BAR).expect("written");
+    for order in [1, 2] {
+        let order = format!("analysis.order={order}");
+        let run = home.path().join("run");
+        fluxmorph(&[&"solve", &config, &"--out", &run, &"--quiet", &"--force", &"--set", &order]).completed();
+        let result = read_json(&run.join("result.json"));
+        let of = |state: usize, key: &str| number(&result["states"][state]["coils"][0][key]);
+        let linkage = |state: usize| phasor(&result["states"][state]["coils"][0]["flux_linkage_wb"])[0];
+        let at_rest = number(&result["states"][0]["coils"][0]["flux_linkage_wb"]);
+        println!("order {order}: {at_rest:e}, {:e}, {:e} Wb", linkage(1), linkage(2));
+        for state in [1, 2] {
+            assert!((linkage(state) / at_rest - 1.0).abs() < 1e-6);
+            assert!((of(state, "resistance_ohm") / of(0, "resistance_ohm") - 1.0).abs() < 1e-6);
+        }
+    }
+}
+
 #[test]
 fn an_open_and_a_short_circuited_coil_are_two_loads_of_one_device() {
     let loads = "[[loads]]\nname = \"open\"\nampere_turns = { two = 0 }\n[[loads]]\nname = \"short\"\n\

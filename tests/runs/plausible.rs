@@ -214,6 +214,88 @@ fn a_device_in_open_space_needs_no_condition() {
     assert!(!texts(&json["warnings"]).contains("no surface has a condition"), "{}", json["warnings"]);
 }
 
+/// The shell stands for all of space: the stress in it is not that of its elements.
+#[test]
+fn a_force_is_not_taken_in_the_shell_of_open_space() {
+    let home = folder();
+    let path = home.path().join("magnet.toml");
+    std::fs::write(&path, format!("{MAGNET}\n[[forces]]\nname = \"magnet\"\nregions = [\"magnet\"]\n"))
+        .expect("written");
+    let with = |sets: &[&str]| finish(command(&[&"check", &path]).args(set(sets)));
+    with(&[]).exits_with(0);
+    let flush = "mesh.boxes.box=[[\"-10 mm\", \"-30 mm\", \"-30 mm\"], [\"30 mm\", \"30 mm\", \"30 mm\"]]";
+    let touching = with(&[flush]).exits_with(2);
+    assert!(touching.stderr.contains("which meets the shell of open space in `open`"), "{}", touching.stderr);
+    let shell = with(&["forces[0].regions=[\"magnet\", \"open\"]"]).exits_with(2);
+    assert!(shell.stderr.contains("meets the shell of open space"), "{}", shell.stderr);
+}
+
+/// Rings in cells of twice and ten times their section have 17 and 37 % too little.
+#[test]
+fn a_winding_thinner_than_its_elements_is_said_to_have_too_little_inductance() {
+    let with = |sets: &[&str]| {
+        let mut checked = command(&[&"check", &repository("configs/coupled_coils.toml"), &"--json"]);
+        texts(&finish(checked.args(set(sets))).exits_with(0).json()["warnings"])
+    };
+    let thin = "the winding of `receiver` is 1.000 mm across in cells of";
+    assert!(!with(&[]).contains("mm across in cells of"), "{}", with(&[]));
+    let sets = ["coils[1].width=\"1 mm\"", "coils[1].height=\"1 mm\""];
+    assert!(with(&sets).contains(thin), "{}", with(&sets));
+}
+
+/// A frame with two windows, and a coil around one of them: its current parts.
+const FRAME: &str = r#"
+[mesh]
+generator = "boxes"
+
+[mesh.boxes]
+box = [["-60 mm", "-40 mm", "-30 mm"], ["60 mm", "40 mm", "30 mm"]]
+growth = 1.8
+
+[[mesh.boxes.regions]]
+name = "frame"
+box = [["-30 mm", "-18 mm", "-3 mm"], ["30 mm", "18 mm", "3 mm"]]
+size = "3 mm"
+
+[[mesh.boxes.regions]]
+name = "air"
+box = [["-24 mm", "-12 mm", "-3 mm"], ["-3 mm", "12 mm", "3 mm"]]
+
+[[mesh.boxes.regions]]
+name = "air"
+box = [["3 mm", "-12 mm", "-3 mm"], ["24 mm", "12 mm", "3 mm"]]
+
+[analysis]
+frequency = 0
+
+[[coils]]
+name = "frame"
+region = "frame"
+ampere_turns = "100 A"
+center = ["-13 mm", "0 mm", "0 mm"]
+
+[open]
+surfaces = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
+"#;
+
+#[test]
+fn a_winding_that_branches_is_no_noise() {
+    let home = folder();
+    let path = home.path().join("frame.toml");
+    let notices = |text: &str| {
+        std::fs::write(&path, text).expect("written");
+        let checked = finish(&mut command(&[&"check", &path])).exits_with(0);
+        checked.stdout + &checked.stderr
+    };
+    let (branched, noise) = ("the region branches", "noise from element to element");
+    let text = notices(FRAME);
+    assert!(text.contains(branched) && !text.contains(noise), "{text}");
+    // A frame with one window bends four times, and no more.
+    let text =
+        notices(&FRAME.replace("[[\"3 mm\", \"-12 mm\", \"-3 mm\"]", "[[\"-3 mm\", \"-12 mm\", \"-3 mm\"]"));
+    assert!(!text.contains(branched) && text.contains(noise), "{text}");
+}
+
 /// A cube of 20 mm in a box, whole.
 const MAGNET: &str = r#"
 [mesh]

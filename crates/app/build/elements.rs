@@ -3,7 +3,7 @@
 //! What would be off by more than a tenth is refused, what may be is a warning; both name the key that cures it. The limits are
 //! measured (docs/verification.md, 2.8).
 
-use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::{Mesh, Millimetres};
 use fluxmorph_solver::audit::NodalErrors;
 
 use super::entries::material;
@@ -144,8 +144,8 @@ fn coarse(config: &Config, Audited { audit, model }: &Audited, errors: &NodalErr
         "the cells of `{}` are {:.3} mm wide on average at a skin depth of {:.3} mm, {place} nodal elements of order {} cannot \
          make A + grad(psi) zero: {wrong} may be wrong by a tenth to factors{beside}",
         audit.region,
-        audit.edge_length * 1e3,
-        audit.skin_depth * 1e3,
+        Millimetres(audit.edge_length),
+        Millimetres(audit.skin_depth),
         u8::from(config.analysis.order),
     )
 }

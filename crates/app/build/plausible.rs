@@ -6,9 +6,9 @@ use std::collections::HashSet;
 use std::ops::RangeInclusive;
 
 use fluxmorph_geometry::soundness::OpenPatch;
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub, volume};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
@@ -22,6 +22,9 @@ use crate::config::{
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
 /// one is the same.
 const THINNEST: f64 = 1e-6;
+
+/// Size of the elements over that of a winding, for first order, above which its inductance is off by more than an eighth.
+const THIN: f64 = 1.5;
 
 /// Shares of the mesh's size below and above which a coil looks like one in another unit.
 const ALIKE: [f64; 2] = [2e-2, 2.0];
@@ -166,6 +169,9 @@ pub(super) fn warnings(
         own.remanence.map(|remanence| magnet_warnings(config, mesh, (name, remanence))).unwrap_or_default()
     }));
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
+    warnings.extend(
+        windings(coils).filter_map(|(i, winding)| thin_warning(config, mesh, &config.coils[i], winding)),
+    );
     warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body)));
     warnings.extend(cut_force_warnings(config, mesh));
     warnings.extend(unit_hint(config, mesh));
@@ -405,6 +411,28 @@ fn half_extent(coil: &Coil) -> Option<[f64; 3]> {
         CoilShape::Circular(c) => of([c.radius; 2], c.width, c.height),
         CoilShape::Region(_) => None,
     }
+}
+
+/// What to say of a winding whose inductance is asked for and that is thinner than the elements in which it lies.
+fn thin_warning(config: &Config, mesh: &Mesh, coil: &Coil, winding: &Racetrack) -> Option<String> {
+    coil.turns?;
+    let across = section(coil).into_iter().map(|(_, length)| length).product::<f64>().sqrt();
+    let elements = mesh.topology().elements().map(|e| mesh.vertices(e));
+    // Six tetrahedra are a cube.
+    let in_winding = elements.filter(|&vertices| winding.wound_place(vertices).is_some());
+    let mut cells: Vec<f64> = in_winding.map(|vertices| (6.0 * volume(vertices)).cbrt()).collect();
+    cells.sort_by(f64::total_cmp);
+    let cell = *cells.get(cells.len() / 2)?;
+    (cell > THIN * f64::from(u8::from(config.analysis.order)) * across).then(|| {
+        format!(
+            "the winding of `{}` is {:.3} mm across in cells of {:.3} mm: the field in and beside it is that of a thicker one, and its \
+             own inductance too small, of a ring by a sixth in cells of twice its section and by a third in those of ten times; \
+             elements of its size along the winding cure that",
+            coil.name,
+            Millimetres(across),
+            Millimetres(cell)
+        )
+    })
 }
 
 /// The sizes of an analytic coil's winding by their keys [m].

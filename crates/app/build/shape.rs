@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{Point, add, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::{Facet, face_key};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, millimetres};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_optimizer::problem::Shape;
@@ -262,12 +262,12 @@ fn vanishing_faults(
         let Some((least, thickness)) = thinnest.filter(|(least, _)| *least <= 0.0) else { continue };
         let message = format!(
             "`{key}` is {:.3} mm, and the body is {:.3} mm thick there: nothing would be left of it",
-            bound * 1e3,
-            thickness * 1e3
+            Millimetres(bound),
+            Millimetres(thickness)
         );
         let fault = source.diagnostic(key, message);
         let share = bound * thickness / (thickness - least);
-        faults.push(fault.expected(format!("a bound nearer to zero than {:.3} mm", share * 1e3)));
+        faults.push(fault.expected(format!("a bound nearer to zero than {:.3} mm", Millimetres(share))));
     }
     faults
 }

@@ -10,7 +10,7 @@ use fluxmorph_geometry::soundness::{
 };
 use fluxmorph_geometry::tet4::{self, centroid, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 
 use super::entries::material;
 use super::open;
@@ -89,8 +89,8 @@ fn layer_warning(mesh: &Mesh, surface: &str) -> Option<String> {
          that moves this surface shears them; mesh both ends of an extrusion alike, node above node",
         100.0 * share,
         millimetres(place),
-        lean * 1e3,
-        height * 1e3
+        Millimetres(lean),
+        Millimetres(height)
     ))
 }
 

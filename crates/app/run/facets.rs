@@ -8,7 +8,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
-use fluxmorph_geometry::{Mesh, NodeId, millimetres};
+use fluxmorph_geometry::{Mesh, Millimetres, NodeId, millimetres};
 use fluxmorph_solver::Material;
 
 use crate::build::{functionals, material};
@@ -107,7 +107,7 @@ pub(super) fn described(found: &CurvedFacets) -> String {
         "`{}` is curved, and its facets are up to {:.3} mm off it, at {}: no error bar counts that, and refined meshes and cut \
          elements keep the facets; begin with smaller faces there to see what it does",
         found.surface,
-        1e3 * found.off_m,
+        Millimetres(found.off_m),
         millimetres(found.at_m)
     )
 }

@@ -1,5 +1,7 @@
 //! The row that an evaluation leaves on a terminal or in a log, and the header over it.
 
+use fluxmorph_geometry::Millimetres;
+
 use super::Evaluation;
 
 /// How much a row says.
@@ -34,7 +36,7 @@ pub(super) fn row(row: &Evaluation, columns: Columns) -> String {
         .map(|(column, c)| worst_of(&format!("{c:+.1e} {}", column.trim_start_matches("c_"))))
         .unwrap_or_default();
     let thickness = match (row.min_thickness_m, row.max_thickness_m) {
-        (Some(least), Some(most)) => format!("{:.2} .. {:.2}", least * 1e3, most * 1e3),
+        (Some(least), Some(most)) => format!("{:.2} .. {:.2}", Millimetres(least), Millimetres(most)),
         _ => "-".to_owned(),
     };
     let cells = [
@@ -43,7 +45,7 @@ pub(super) fn row(row: &Evaluation, columns: Columns) -> String {
         format!("{:.6e}", row.objective),
         super::ratio(row.ratio),
         format!("{:.2e}", row.gradient_norm),
-        format!("{:.3}", row.step_norm * 1e3),
+        format!("{:.3}", Millimetres(row.step_norm)),
         format!("{:.4}", row.worst_quality),
         thickness,
         row.linear_iterations.to_string(),

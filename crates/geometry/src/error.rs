@@ -3,15 +3,7 @@
 use std::path::PathBuf;
 
 use crate::ids::{ElementId, NodeId};
-
-/// A place [m] for messages, to a micrometre; to a nanometre where it lies within a tenth of a millimetre of the origin.
-pub fn millimetres([x, y, z]: [f64; 3]) -> String {
-    let digits = if [x, y, z].iter().all(|c| c.abs() < 1e-4) && [x, y, z] != [0.0; 3] { 6 } else { 3 };
-    let scale = 10f64.powi(digits + 3);
-    let round = |c: f64| (c * scale).round() / scale * 1e3 + 0.0;
-    let digits = digits as usize;
-    format!("({:.digits$}, {:.digits$}, {:.digits$}) mm", round(x), round(y), round(z))
-}
+use crate::millimetres::millimetres;
 
 /// Errors of this crate; each names the culprit.
 #[derive(Debug, thiserror::Error)]

@@ -21,6 +21,7 @@ pub mod incidence;
 pub mod io;
 pub mod locate;
 pub mod mesh;
+pub mod millimetres;
 pub mod parallel;
 pub mod quality;
 pub mod refine;
@@ -28,8 +29,9 @@ pub mod soundness;
 pub mod tet4;
 pub mod topology;
 
-pub use error::{MeshError, millimetres};
+pub use error::MeshError;
 pub use ids::{CarrierId, ElementId, NodeId, RegionId};
 pub use mesh::Mesh;
+pub use millimetres::{Millimetres, millimetres};
 pub use parallel::Partition;
 pub use topology::{Facet, Topology};

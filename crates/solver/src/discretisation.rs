@@ -13,6 +13,7 @@ use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 use crate::boundary::Boundary;
 use crate::circuit::{SolidRows, Solids};
 use crate::element::tensor::{CurlsOfRule, TensorTerm};
+use crate::element::volume::Coefficients;
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::family::{self, Local, Matrices};
@@ -54,9 +55,15 @@ trait Bound: std::fmt::Debug + Send + Sync {
     fn add_tangents(&self, of: &Discretisation, tangents: &Tangents, mesh: &Mesh, values: &mut [c64]);
     /// `f −= K A_prescribed` of the elements and triangles that prescribed values touch.
     fn subtract_lift(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, load: &mut [c64]);
-    /// The matrix of an element times some coefficients.
-    fn times(&self, of: &Discretisation, weak_form: &WeakForm, mesh: &Mesh, e: ElementId, x: &Local)
-    -> Local;
+    /// What conduction has of the matrix of an element, times some coefficients.
+    fn conduction_times(
+        &self,
+        of: &Discretisation,
+        weak_form: &WeakForm,
+        mesh: &Mesh,
+        e: ElementId,
+        x: &Local,
+    ) -> Local;
 }
 
 /// Groups of elements with `N` and triangles with `F` carriers.
@@ -112,7 +119,7 @@ impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F
         }
     }
 
-    fn times(
+    fn conduction_times(
         &self,
         of: &Discretisation,
         weak_form: &WeakForm,
@@ -120,7 +127,8 @@ impl<K: Matrices<N, F>, const N: usize, const F: usize> Bound for Groups<K, N, F
         e: ElementId,
         x: &Local,
     ) -> Local {
-        let matrix = weak_form.tet(self.matrices, of.space.cell(mesh, e), e);
+        let law = Coefficients { reluctivity: 0.0, extra_penalty: 0.0, ..*weak_form.coefficients_of(e) };
+        let matrix = self.matrices.tet(of.space.cell(mesh, e), law);
         Local::new(N, |a| {
             let mut row = [c64::default(); 4];
             for (b, x) in x.values().iter().enumerate().take(N) {
@@ -295,7 +303,7 @@ impl Discretisation {
 
     /// What solid conductors add to the matrix on a mesh.
     pub(crate) fn solid_rows(&self, solids: &Solids, weak_form: &WeakForm, mesh: &Mesh) -> SolidRows {
-        let times = |e: ElementId, x: &Local| self.groups.times(self, weak_form, mesh, e, x);
+        let times = |e: ElementId, x: &Local| self.groups.conduction_times(self, weak_form, mesh, e, x);
         let scatter = |e: ElementId, local: &Local, load: &mut [c64]| {
             for (&carrier, values) in self.space.carriers_of(e).iter().zip(local.values()) {
                 self.unknowns.scatter_add(load, carrier, *values);

@@ -64,26 +64,40 @@ fn exact() -> f64 {
     2.0 * sheets(GAP + 2.0 * HALF) - sheets(GAP) - sheets(GAP + 4.0 * HALF)
 }
 
-/// Forces or torques on magnets, of which the upper one points along a direction.
+/// All outer faces.
+const WALLS: [&str; 6] = ["x_min", "y_min", "x_max", "y_max", "z_min", "z_max"];
+
+/// Forces or torques on magnets, of which the upper one points along a direction, between walls.
 fn found<const N: usize>(
     mesh: &Mesh,
-    (names, motion): ([&str; N], RigidMotion),
+    what: ([&str; N], RigidMotion),
     along: Point,
+    elements: (ElementFamily, Order),
+) -> [f64; N] {
+    let walls = WALLS.map(|surface| (surface.to_owned(), Boundary::FluxParallel)).to_vec();
+    found_within(mesh, what, [UP, along], walls, elements)
+}
+
+/// The same of magnets along two directions, the lower one's first, with other conditions.
+fn found_within<const N: usize>(
+    mesh: &Mesh,
+    (names, motion): ([&str; N], RigidMotion),
+    along: [Point; 2],
+    boundaries: Vec<(String, Boundary)>,
     (family, order): (ElementFamily, Order),
 ) -> [f64; N] {
     let topology = mesh.topology();
     let remanence = |name: &String| match name.as_str() {
-        "lower" => [0.0, 0.0, REMANENCE],
-        "upper" => along.map(|c| REMANENCE * c),
+        "lower" => along[0].map(|c| REMANENCE * c),
+        "upper" => along[1].map(|c| REMANENCE * c),
         _ => [0.0; 3],
     };
-    let surfaces = ["x_min", "y_min", "x_max", "y_max", "z_min", "z_max"];
     let setup = FieldModelSetup {
         family,
         order,
         materials: vec![Material::AIR; topology.region_names().len()],
         remanence: topology.region_names().iter().map(remanence).collect(),
-        boundaries: surfaces.map(|surface| (surface.to_owned(), Boundary::FluxParallel)).to_vec(),
+        boundaries,
         ..FieldModelSetup::default()
     };
     let model = FieldModel::new(mesh, setup).expect("a sound problem");
@@ -148,5 +162,27 @@ fn a_magnet_across_another_one_has_the_torque_of_its_faces() {
         println!("{elements:?}: {:.5} N m, exact {exact:.5} N m", 2.0 * half);
         // .6 and 1.3 % on this mesh.
         assert!((2.0 * half / exact - 1.0).abs() < 0.02, "{elements:?}");
+    }
+}
+
+/// A plane of which nothing is said is flux-normal, and cuts a body as one that is said to be: the stress in the cut is no part of
+/// the force, nor that on the elements of the layer which lie in the plane.
+#[test]
+fn a_natural_face_cuts_a_body_as_a_flux_normal_one_does() {
+    let (mesh, along_x) = (mesh(0.0, 0.7), [1.0, 0.0, 0.0]);
+    let walls = || WALLS[1..].iter().map(|&surface| (surface.to_owned(), Boundary::FluxParallel));
+    let said = || walls().chain([("x_min".to_owned(), Boundary::FluxNormal)]).collect();
+    let about = [0.0, 0.0, 0.5 * GAP + HALF];
+    for motion in [RigidMotion::Translation(along_x), RigidMotion::Rotation { axis: [0.0, 1.0, 0.0], about }]
+    {
+        for family in [ElementFamily::Edge, ElementFamily::Nodal] {
+            let of = |boundaries| {
+                let elements = (family, Order::Quadratic);
+                found_within(&mesh, (["upper"], motion), [along_x; 2], boundaries, elements)[0]
+            };
+            let [natural, said] = [of(walls().collect()), of(said())];
+            println!("{motion:?}, {family:?}: {natural:.6} and {said:.6}");
+            assert!((natural / said - 1.0).abs() < 1e-3);
+        }
     }
 }

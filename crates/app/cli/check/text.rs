@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use fluxmorph_geometry::Millimetres;
+
 use super::estimate::{ConstraintError, EstimateSummary};
 use super::reach::Reach;
 use super::summary::{FieldProblem, Summary};
@@ -361,7 +363,7 @@ fn skin_table(summary: &Summary<'_>) -> Table<5> {
         } else {
             "none inside".to_owned()
         };
-        let depth = format!("{:.3}", s.skin_depth_m * 1e3);
+        let depth = format!("{:.3}", Millimetres(s.skin_depth_m));
         let thickness = format!("{:.1}", s.thickness_in_skin_depths);
         table.row([s.region.clone(), s.model.to_owned(), depth, elements, thickness]);
     }
@@ -378,7 +380,7 @@ fn motion_table(summary: &Summary<'_>) -> Table<5> {
         ("equations", Right),
     ]);
     for m in &summary.motions {
-        let largest = format!("{:.3}", m.largest_displacement_m * 1e3);
+        let largest = format!("{:.3}", Millimetres(m.largest_displacement_m));
         let [nodes, elements, equations] = [m.moved_nodes, m.elements, m.equations].map(|n| n.to_string());
         table.row([m.name.clone(), nodes, largest, elements, equations]);
     }

@@ -29,7 +29,8 @@ table! {
     /// a `region`, halves its `ampere_turns`, and the `turns` of strands; a plane that the current crosses changes neither. The
     /// first is one of `flux_normal`, the second of `flux_parallel`. For either plane `voltage`, `resistance` and
     /// `series_inductance` of strands are half of the whole coil's; a solid conductor keeps its voltage where the plane is along
-    /// the current. A `shape` keeps the ampere-turns and turns of the whole coil.
+    /// the current, and has half of the current, so that what is in series with it counts twice: twice the `resistance` and
+    /// `series_inductance`, half of the `series_capacitance`. A `shape` keeps the ampere-turns and turns of the whole coil.
     ///
     /// ```toml
     /// [[coils]]

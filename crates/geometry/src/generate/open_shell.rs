@@ -7,9 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use crate::error::{MeshError, millimetres};
+use crate::error::MeshError;
 use crate::ids::{NodeId, RegionId};
 use crate::mesh::Mesh;
+use crate::millimetres::millimetres;
 use crate::tet4::{Point, centroid, cross, dot, norm, sub, volume};
 use crate::topology::{Facet, Topology, face_key};
 

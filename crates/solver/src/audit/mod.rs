@@ -13,7 +13,7 @@ pub use nodal::NodalErrors;
 
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, area_vector, norm, sub, volume};
-use fluxmorph_geometry::{ElementId, Mesh, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, Millimetres, RegionId};
 
 use crate::elements::Order;
 use crate::material::Material;
@@ -57,7 +57,7 @@ pub struct SkinAudit {
 impl SkinAudit {
     /// What to tell the user of a conductor whose volume is meshed.
     pub fn volume_warning(&self) -> Option<String> {
-        let (delta, depths) = (self.skin_depth * 1e3, self.thickness_in_skin_depths);
+        let (delta, depths) = (Millimetres(self.skin_depth), self.thickness_in_skin_depths);
         let instead =
             format!("use model = \"impedance\" (the region is {depths:.1} skin depths thick on average)");
         if self.coarse_share > TOLERATED_SHARE {
@@ -96,7 +96,7 @@ impl SkinAudit {
                  lets nothing through to the other side. Use model = \"volume\"",
                 self.region,
                 self.thickness_in_skin_depths,
-                self.skin_depth * 1e3,
+                Millimetres(self.skin_depth),
                 IMPEDANCE_THICKNESS
             )
         })
@@ -110,7 +110,7 @@ impl SkinAudit {
                 "region `{}` is {:.3} mm thick at its thinnest place, {depths:.1} skin depths; an impedance surface assumes \
                  {IMPEDANCE_THICKNESS} or more",
                 self.region,
-                thickness * 1e3
+                Millimetres(thickness)
             )
         })
     }

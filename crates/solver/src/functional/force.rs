@@ -3,13 +3,15 @@
 //! A rigid virtual velocity `v` of the body's nodes, zero at all others, deforms the elements that touch the body from outside.
 //! The force is minus the work of Maxwell's stress there, `−∫σ:∇v` ([`crate::element::virtual_work`]), the rate at which their
 //! energy falls as they carry their flux along; inside the body nothing is deformed. It holds with eddy currents as well: in
-//! harmonics it is the time average. Where the body goes on beyond a conditioned plane, its nodes there keep to the plane, so that
-//! a force is that on the free faces of the meshed part. The layer must be without current, magnetisation and conductivity.
+//! harmonics it is the time average. Where the body goes on beyond an outer face, its nodes there keep to the face, so that a force
+//! is that on the free faces of the meshed part. The layer must be without current, magnetisation and conductivity, and where space
+//! is what it is in the mesh: not in the shell that stands for all of it.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use fluxmorph_geometry::directions::{beside, extend};
-use fluxmorph_geometry::tet4::{Point, cross, sub};
+use fluxmorph_geometry::directions::{beside, extend, unit};
+use fluxmorph_geometry::tet4::{Point, area_vector, cross, sub};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
 
@@ -21,6 +23,7 @@ use crate::error::SolverError;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
+use crate::surface::SurfaceTerm;
 
 /// A component of force or torque: the work per unit of a rigid motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +67,7 @@ pub fn resultant(nodal: &BTreeMap<NodeId, Point>, mesh: &Mesh, about: Point) -> 
 pub struct Force {
     /// Elements that touch the body from outside, ascending.
     layer: Vec<ElementId>,
-    /// Nodes of the body, with the directions in which they cannot move, across conditioned surfaces: orthonormal.
+    /// Nodes of the body, with the directions in which they cannot move, across outer faces: orthonormal.
     body: BTreeMap<NodeId, Vec<Point>>,
     motion: RigidMotion,
 }
@@ -73,7 +76,8 @@ impl Force {
     /// The force on the body that some regions make up.
     ///
     /// # Errors
-    /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not free.
+    /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not free, or where it
+    /// is itself in the shell of open space.
     pub fn new(
         model: &FieldModel,
         mesh: &Mesh,
@@ -86,7 +90,7 @@ impl Force {
         let inside = |e: &ElementId| regions.contains(&region_of(*e));
         let of_body = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
         let mut body: BTreeMap<NodeId, Vec<Point>> = of_body.map(|node| (node, Vec::new())).collect();
-        for (node, normal) in conditioned(model) {
+        for (node, normal) in conditioned(model).chain(natural(model, mesh)?) {
             body.entry(node).and_modify(|held| extend(held, normal, INDEPENDENT));
         }
         let around = body.keys().flat_map(|&node| topology.elements_around(node)).copied();
@@ -100,6 +104,11 @@ impl Force {
             place: fluxmorph_geometry::tet4::centroid(mesh.vertices(e)),
             what,
         };
+        for e in topology.elements().filter(inside).chain(layer.iter().copied()) {
+            if model.is_open(e) {
+                return Err(fault(e, "the shell of open space"));
+            }
+        }
         for &e in &layer {
             if model.curve_of(e).is_some() {
                 return Err(fault(e, "iron with a B–H curve"));
@@ -194,6 +203,24 @@ fn conditioned(model: &FieldModel) -> impl Iterator<Item = (NodeId, Point)> + '_
         across.map(move |axis| (node, std::array::from_fn(|d| f64::from(u8::from(d == axis)))))
     });
     of_planes.chain(unknowns.oblique_nodes().iter().copied())
+}
+
+/// The nodes of outer faces of which nothing is said, with the normals of these: `n × H = 0` there, as on a flux-normal plane.
+fn natural(model: &FieldModel, mesh: &Mesh) -> Result<impl Iterator<Item = (NodeId, Point)>, SolverError> {
+    let topology = model.topology();
+    // Jumps of the reluctivity are no condition.
+    let conditioned = model.surface().filter(|(_, term)| !matches!(term, SurfaceTerm::Interface(_)));
+    let mut with_condition: HashSet<_> = conditioned.map(|(face, _)| face_key(face)).collect();
+    for (name, _) in &model.setup().boundaries {
+        with_condition.extend(topology.surface(name)?.iter().map(|face| face_key(*face)));
+    }
+    let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
+    let natural =
+        outer.map(|facet| facet.nodes).filter(move |&nodes| !with_condition.contains(&face_key(nodes)));
+    Ok(natural.flat_map(|nodes| {
+        let normal = unit(area_vector(nodes.map(|node| mesh.point(node))));
+        nodes.map(|node| (node, normal))
+    }))
 }
 
 /// What a normal must have beside directions that are held [1] to be another one, and not of a face of the same surface, which may

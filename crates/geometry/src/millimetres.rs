@@ -1,0 +1,39 @@
+//! Lengths and places in messages and tables: in millimetres, whatever the size of the device.
+
+use std::fmt::{self, Display, Formatter};
+
+/// A length [m] in millimetres, without the unit: with the decimals that the format asks for, three by default, and as a power of
+/// ten where these would show less than two digits of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Millimetres(pub f64);
+
+impl Display for Millimetres {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let (length, decimals) = (1e3 * self.0, f.precision().unwrap_or(3));
+        if length != 0.0 && length.abs() < 10f64.powi(1 - decimals as i32) {
+            return write!(f, "{length:.1e}");
+        }
+        write!(f, "{length:.decimals$}")
+    }
+}
+
+/// A place [m], to a micrometre; to a nanometre where it lies within a tenth of a millimetre of the origin.
+pub fn millimetres([x, y, z]: [f64; 3]) -> String {
+    let digits = if [x, y, z].iter().all(|c| c.abs() < 1e-4) && [x, y, z] != [0.0; 3] { 6 } else { 3 };
+    let scale = 10f64.powi(digits + 3);
+    let round = |c: f64| (c * scale).round() / scale * 1e3 + 0.0;
+    let digits = digits as usize;
+    format!("({:.digits$}, {:.digits$}, {:.digits$}) mm", round(x), round(y), round(z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_lengths_keep_two_digits() {
+        let shown = |length: f64| format!("{:.3}", Millimetres(length));
+        assert_eq!([1.2345, 0.010e-3, 0.0, -0.25e-6].map(shown), ["1234.500", "0.010", "0.000", "-2.5e-4"]);
+        assert_eq!(format!("{:.2} {}", Millimetres(2.5e-5), Millimetres(2.5e-5)), "2.5e-2 0.025");
+    }
+}
