@@ -23,8 +23,8 @@ use crate::config::{
 /// one is the same.
 const THINNEST: f64 = 1e-6;
 
-/// Size of the elements over that of a winding, for first order, above which its inductance is off by more than an eighth.
-const THIN: f64 = 1.5;
+/// Size of the elements over that of a winding, for first order, above which its inductance is off by more than a tenth.
+const THIN: f64 = 1.0;
 
 /// Shares of the mesh's size below and above which a coil looks like one in another unit.
 const ALIKE: [f64; 2] = [2e-2, 2.0];
@@ -426,7 +426,7 @@ fn thin_warning(config: &Config, mesh: &Mesh, coil: &Coil, winding: &Racetrack) 
     (cell > THIN * f64::from(u8::from(config.analysis.order)) * across).then(|| {
         format!(
             "the winding of `{}` is {:.3} mm across in cells of {:.3} mm: the field in and beside it is that of a thicker one, and its \
-             own inductance too small, of a ring by a sixth in cells of twice its section and by a third in those of ten times; \
+             own inductance too small, of a ring by a tenth in cells of its section and by a third in those of ten times; \
              elements of its size along the winding cure that",
             coil.name,
             Millimetres(across),
