@@ -117,26 +117,36 @@ impl Recorder for Tape {
 #[test]
 fn what_is_beyond_a_bound_by_little_is_taken_a_step_back() {
     let (mut problem, own) = changed("busbar.toml", &[]);
-    let mut tape = Tape::default();
     let mut run = |tape: &mut Tape, max_evaluations: usize| {
         let settings = Optimizer { algorithm: Algorithm::Slsqp, max_evaluations, ..own.clone() };
         let run = optimise(&mut problem, &settings.settings(), &mut Silent, tape, &|| false);
         let run = run.unwrap_or_else(|e| panic!("{e}"));
-        println!("{} evaluations: F/F0 {:.5}", run.evaluations, run.best.objective / run.initial);
+        let ratio = run.best.objective / run.initial;
+        println!("{} evaluations: F/F0 {ratio:.5}, {:?}", run.evaluations, run.stop_reason);
         assert_eq!(run.best.violation, 0.0);
-        (run.best.objective / run.initial, run.evaluations)
+        (ratio, run.stop_reason)
     };
-    let (kept, evaluations) = run(&mut tape, 8);
-    assert_eq!(evaluations, 8);
-    let steps: Vec<bool> = tape.written.iter().map(|record| record.stepped_back).collect();
-    assert_eq!(steps, [false, false, false, false, false, false, false, true]);
-    let best = &tape.written[7];
-    let others = tape.written[1..7].iter().filter(|own| own.row.constraints["c_volume_bar"] <= 1e-6);
-    assert!(best.improved && kept < 0.94 && others.count() == 0, "{kept}");
+    let mut whole = Tape::default();
+    let (kept, reason) = run(&mut whole, 8);
+    assert_eq!((reason, whole.written.len()), (StopReason::MaxEvaluations, 8));
+    let why = |record: &Record| record.stepped_back;
+    let whys: Vec<_> = whole.written.iter().map(why).collect();
+    assert_eq!(whys, [&[None; 7][..], &[Some(StopReason::MaxEvaluations)]].concat());
+    let others = whole.written[1..7].iter().filter(|own| own.row.constraints["c_volume_bar"] <= 1e-6);
+    assert!(whole.written[7].improved && kept < 0.94 && others.count() == 0, "{kept}");
 
-    let mut resumed = Tape { written: tape.written.clone(), played: 0 };
-    let (further, evaluations) = run(&mut resumed, 12);
-    assert!(further <= kept && evaluations > 8 && resumed.written[..8] == tape.written[..]);
+    for cut in [2, 7, 8] {
+        let mut again = Tape { written: whole.written[..cut].to_vec(), played: 0 };
+        assert_eq!(run(&mut again, 8), (kept, reason), "cut at {cut}");
+        let designs = |tape: &Tape| tape.written.iter().map(|own| own.design.clone()).collect::<Vec<_>>();
+        assert_eq!(designs(&again), designs(&whole), "cut at {cut}");
+    }
+    let mut longer = Tape { written: whole.written.clone(), played: 0 };
+    run(&mut longer, 11);
+    let mut once_more = Tape { written: longer.written.clone(), played: 0 };
+    let (further, _) = run(&mut once_more, 11);
+    assert!(longer.written.len() > 8 && once_more.written.len() == longer.written.len());
+    assert!(further <= kept, "{further} {kept}");
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, Millimetres, NodeId, Topology, millimetres};
+use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology, millimetres};
 use fluxmorph_optimizer::design::{
     BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
     default_filter_radius,
@@ -184,7 +184,7 @@ fn fault(source: &SourceMap, design: &config::Design, error: DesignError) -> Err
                     "the {what} at {} has no partner in the mirror {axis} = {:.3} mm: the nearest lies {:.3e} mm from its \
                      image",
                     millimetres(point),
-                    Millimetres(at),
+                    at * 1e3,
                     distance * 1e3
                 ),
             )

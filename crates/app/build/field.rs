@@ -361,8 +361,8 @@ fn winding(coil: &config::Coil) -> Option<Winding> {
 /// Divergence of a current, relative to its density, below which nothing is said of it.
 const LEAST_DIVERGENCE: f64 = 1e-4;
 
-/// Share that the projection changes of a current, above which its region can be no winding: sharp bends have up to 17 % and
-/// a frame in which the current branches 32 %.
+/// Share that the projection changes of a current, above which its region is no bundle of strands: sharp bends have up to 17 %, a
+/// frame in which the current branches has 32 %.
 const BRANCHED: f64 = 0.25;
 
 /// Notices about the current of each coil region.
@@ -373,14 +373,15 @@ pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
         CoilShape::Region(current) => {
             let report = current.report();
             let is_smooth = report.after.jump.max(report.after.wall) < LEAST_DIVERGENCE;
-            let meaning = if report.correction > BRANCHED {
-                "the region branches, or its cross-section changes along the way, and strands that share the current equally do \
-                 neither: give each winding a region of its own, or set conductor = \"solid\" where currents may part"
+            let is_branched = report.correction > BRANCHED;
+            let meaning = if is_branched {
+                "the region branches, or its cross-section changes along the way, and strands of one current density do not fit it: \
+                 give each winding a region of its own, or set conductor = \"solid\" where currents may part"
             } else {
                 "that is noise from element to element where the winding bends: an inductance in air is off by about a tenth of \
                  it, beside iron by far less, and a finer mesh of the winding has less"
             };
-            (!is_smooth).then(|| format!("coil `{}`: {report}; {meaning}", coil.name))
+            (is_branched || !is_smooth).then(|| format!("coil `{}`: {report}; {meaning}", coil.name))
         }
     };
     model.coils().iter().filter_map(notice).collect()

@@ -199,7 +199,9 @@ impl Blame<'_> {
                 self.at(&format!("materials.{name}.{key}"), error)
             }
             SolverError::SolidOnRanks { coil } => self.at(&format!("{}.conductor", self.coil(coil)?), error),
-            SolverError::Layer { body, .. } | SolverError::NoLayer { body } => {
+            SolverError::Layer { body, .. }
+            | SolverError::NoLayer { body }
+            | SolverError::ForceInShell { body, .. } => {
                 let index = self.config.forces.iter().position(|own| own.name == *body)?;
                 self.at(&format!("forces[{index}].regions"), error)
             }

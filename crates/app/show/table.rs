@@ -13,6 +13,9 @@ pub(super) enum Columns {
     Compact,
 }
 
+/// Width of the column of thicknesses.
+const THICKNESS: usize = 15;
+
 /// The last column, of a width that common names of constraints fit into.
 fn worst_of(text: &str) -> String {
     format!("  {text:<24.40}")
@@ -36,7 +39,11 @@ pub(super) fn row(row: &Evaluation, columns: Columns) -> String {
         .map(|(column, c)| worst_of(&format!("{c:+.1e} {}", column.trim_start_matches("c_"))))
         .unwrap_or_default();
     let thickness = match (row.min_thickness_m, row.max_thickness_m) {
-        (Some(least), Some(most)) => format!("{:.2} .. {:.2}", Millimetres(least), Millimetres(most)),
+        (Some(least), Some(most)) => {
+            let [least, most] = [least, most].map(|length| format!("{:.2}", Millimetres(length)));
+            let blank = if least.len() + most.len() + 4 > THICKNESS { "" } else { " " };
+            format!("{least}{blank}..{blank}{most}")
+        }
         _ => "-".to_owned(),
     };
     let cells = [
@@ -58,12 +65,12 @@ fn line(columns: Columns, cells: [&str; 10]) -> String {
     let [eval, iter, f, ratio, gradient, step, quality, thickness, linear, seconds] = cells;
     match columns {
         Columns::All => format!(
-            "{eval:>4} {iter:>4} {f:>13} {ratio:>8} {gradient:>9} {step:>9} {quality:>8} {thickness:>15} {linear:>6} \
+            "{eval:>4} {iter:>4} {f:>13} {ratio:>8} {gradient:>9} {step:>9} {quality:>8} {thickness:>THICKNESS$} {linear:>6} \
              {seconds:>7}"
         ),
         Columns::Compact => {
             format!(
-                "{eval:>4} {iter:>4} {f:>13} {ratio:>8} {step:>9} {quality:>8} {thickness:>15} {seconds:>7}"
+                "{eval:>4} {iter:>4} {f:>13} {ratio:>8} {step:>9} {quality:>8} {thickness:>THICKNESS$} {seconds:>7}"
             )
         }
     }

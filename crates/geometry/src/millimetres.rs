@@ -2,14 +2,14 @@
 
 use std::fmt::{self, Display, Formatter};
 
-/// A length [m] in millimetres, without the unit: with the decimals that the format asks for, three by default, and as a power of
-/// ten where these would show less than two digits of it.
+/// A length [m], and no position, in millimetres, without the unit: with the decimals that the format asks for, three by default,
+/// and as a power of ten where these would show less than two digits of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Millimetres(pub f64);
 
 impl Display for Millimetres {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let (length, decimals) = (1e3 * self.0, f.precision().unwrap_or(3));
+        let (length, decimals) = (1e3 * self.0 + 0.0, f.precision().unwrap_or(3));
         if length != 0.0 && length.abs() < 10f64.powi(1 - decimals as i32) {
             return write!(f, "{length:.1e}");
         }
@@ -33,7 +33,7 @@ mod tests {
     #[test]
     fn small_lengths_keep_two_digits() {
         let shown = |length: f64| format!("{:.3}", Millimetres(length));
-        assert_eq!([1.2345, 0.010e-3, 0.0, -0.25e-6].map(shown), ["1234.500", "0.010", "0.000", "-2.5e-4"]);
+        assert_eq!([1.2345, 0.010e-3, -0.0, -0.25e-6].map(shown), ["1234.500", "0.010", "0.000", "-2.5e-4"]);
         assert_eq!(format!("{:.2} {}", Millimetres(2.5e-5), Millimetres(2.5e-5)), "2.5e-2 0.025");
     }
 }

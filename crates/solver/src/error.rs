@@ -125,7 +125,7 @@ pub enum SolverError {
     /// The layer around a body on which a force is sought is not free.
     #[error(
         "the force on `{body}` is taken in the layer of elements around it, which meets {what} in `{region}` at {}: \
-         a body needs a layer of air around it; put air between it and what it touches, or add that matter to its regions",
+         a body needs a layer of air around it; add what it touches to its regions",
         millimetres(*place)
     )]
     Layer {
@@ -134,6 +134,17 @@ pub enum SolverError {
         /// Where [m].
         place: [f64; 3],
         what: &'static str,
+    },
+    /// A body on which a force is sought, or the layer of elements around it, is in the shell of open space.
+    #[error(
+        "the force on `{body}` is taken in the layer of elements around it, and the body touches or holds the shell of open space, at \
+         {}: there an element stands for another piece of space; leave a layer of elements between the body and the shell",
+        millimetres(*place)
+    )]
+    ForceInShell {
+        body: String,
+        /// Where [m].
+        place: [f64; 3],
     },
     /// A body on which a force is sought that fills the mesh.
     #[error(

@@ -28,9 +28,10 @@ table! {
     /// On a symmetry model all numbers are those of the meshed part. A plane along the current, which halves the cross-section of
     /// a `region`, halves its `ampere_turns`, and the `turns` of strands; a plane that the current crosses changes neither. The
     /// first is one of `flux_normal`, the second of `flux_parallel`. For either plane `voltage`, `resistance` and
-    /// `series_inductance` of strands are half of the whole coil's; a solid conductor keeps its voltage where the plane is along
-    /// the current, and has half of the current, so that what is in series with it counts twice: twice the `resistance` and
-    /// `series_inductance`, half of the `series_capacitance`. A `shape` keeps the ampere-turns and turns of the whole coil.
+    /// `series_inductance` of strands are half of the whole coil's, and `series_capacitance` is twice; so it is for a solid conductor
+    /// that the plane crosses. Where the plane is along the current a solid conductor keeps its voltage and has half of the current,
+    /// so that what is in series with it counts twice: twice the `resistance` and `series_inductance`, half of the
+    /// `series_capacitance`. A `shape` keeps the ampere-turns and turns of the whole coil.
     ///
     /// ```toml
     /// [[coils]]

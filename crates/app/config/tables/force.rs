@@ -4,9 +4,9 @@ use crate::config::table::table;
 
 table! {
     /// A body on which the magnetic force and torque are reported, of the meshed part; in harmonics their time average. Of a body
-    /// that symmetry planes cut, along an axis or oblique, the component across a plane is that on its free faces, without the stress in the cut. It is
-    /// taken by virtual work in the layer of elements around the body, which must be free of current, magnets, conductors
-    /// and B–H curves, and lie within the mesh, not in the shell of `[open]`.
+    /// that symmetry planes or other outer faces cut, along an axis or oblique, the component across a plane is that on its free
+    /// faces, without the stress in the cut. It is taken by virtual work in the layer of elements around the body, which must be
+    /// free of current, magnets, conductors and B–H curves, and lie within the mesh, not in the shell of `[open]`.
     ///
     /// ```toml
     /// [[forces]]

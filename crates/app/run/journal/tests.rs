@@ -6,7 +6,7 @@ use fluxmorph_optimizer::problem::Timings;
 use fluxmorph_solver::linear::Method;
 
 use super::*;
-use crate::files::{OverwritePolicy, system_disk};
+use crate::files::{OverwritePolicy, StopReason, system_disk};
 use crate::show::Evaluation;
 
 pub(super) fn identity() -> Identity {
@@ -36,7 +36,7 @@ pub(super) fn record(number: usize) -> Record {
             ..Evaluation::default()
         },
         improved: number.is_multiple_of(2),
-        stepped_back: number.is_multiple_of(3),
+        stepped_back: number.is_multiple_of(3).then_some(StopReason::MaxEvaluations),
         design: vec![x, -0.0, f64::MIN_POSITIVE],
         gradient: vec![1.0 / 3.0, x, -x],
         constraints: vec![(x, vec![0.1, 0.2, 0.3])],

@@ -19,7 +19,7 @@ mod transfer;
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::tet4::{Point, dot};
-use fluxmorph_geometry::{Mesh, Millimetres, NodeId, millimetres};
+use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 pub use filter::{cell_size, default_filter_radius};
 pub use grid::dominant_axis;
@@ -136,7 +136,7 @@ pub enum DesignError {
     /// A mirrored variable has no partner.
     #[error(
         "the {what} at {} has no partner in the mirror {axis} = {:.3} mm: the nearest lies {:.3e} mm from its mirror image",
-        millimetres(*point), Millimetres(*at), distance * 1e3
+        millimetres(*point), at * 1e3, distance * 1e3
     )]
     NoPartner {
         what: &'static str,

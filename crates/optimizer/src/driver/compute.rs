@@ -76,7 +76,7 @@ impl Run<'_> {
     ///
     /// What is known of the best design is not computed again, nor what was computed before the run was
     /// interrupted.
-    fn sample_of(&mut self, p: &[f64], moved: (&Moved, f64)) -> Result<Sample, Stop> {
+    pub(super) fn sample_of(&mut self, p: &[f64], moved: (&Moved, f64)) -> Result<Sample, Stop> {
         if let Some(sample) = self.known(p) {
             return Ok(sample.clone());
         }
@@ -232,7 +232,7 @@ impl Run<'_> {
         Record {
             row,
             improved: false,
-            stepped_back: self.is_stepping_back,
+            stepped_back: self.stepping_back,
             design: p.to_vec(),
             gradient,
             constraints: analysis.constraints.iter().map(constraint).collect(),

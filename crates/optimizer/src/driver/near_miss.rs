@@ -2,9 +2,12 @@
 //!
 //! Methods end on a bound from either side. The little by which one is beyond it may be more than counts as kept, and all that
 //! the method has found would count for nothing: where a method ends so, or one evaluation is left, the best of these designs is
-//! evaluated once more, a step back within its bounds.
+//! evaluated once more, a step back within its bounds. That is an evaluation as others, so that a replay comes to it by itself;
+//! where the limit of evaluations asked for it, which a resumed run may have raised, its record says so.
 
+use super::carry::Carriage;
 use super::run::Run;
+use super::stop::Stop;
 use super::{Record, StopReason};
 use crate::error::Error;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
@@ -49,14 +52,15 @@ impl NearMiss {
         })
     }
 
-    /// What it gains on a best design within the bounds, where that is far more than its excess.
-    fn gain(&self, goal: Goal, best: f64) -> Option<f64> {
+    /// What it gains on a best design with this violation and objective: where that keeps the bounds, only what is far more than the
+    /// excess.
+    pub(super) fn gain(&self, goal: Goal, (violation, best): (f64, f64)) -> Option<f64> {
         let gain = goal.sign() * (best - self.objective) / best.abs();
-        (gain > NEAR.max(100.0 * self.worst.1)).then_some(gain)
+        (violation > 0.0 || gain > NEAR.max(100.0 * self.worst.1)).then_some(gain)
     }
 
-    /// The nearest design, to first order, that keeps all constraints and the bounds of the variables.
-    fn stepped_back(&self, lower: &[f64], upper: &[f64]) -> Vec<f64> {
+    /// A design near it that keeps all constraints, to first order, and the bounds of the variables; `None` where none is found.
+    fn stepped_back(&self, lower: &[f64], upper: &[f64]) -> Option<Vec<f64>> {
         let margin = CONSTRAINT_TOLERANCE.max(MARGIN * self.worst.1);
         let mut p = self.design.clone();
         for _ in 0..SWEEPS {
@@ -72,70 +76,104 @@ impl NearMiss {
                 let is_free = |k: usize| if gradient[k] > 0.0 { p[k] > lower[k] } else { p[k] < upper[k] };
                 let free: Vec<usize> = (0..p.len()).filter(|&k| is_free(k)).collect();
                 let square: f64 = free.iter().map(|&k| gradient[k].powi(2)).sum();
-                if square > 0.0 {
-                    let step = (excess + margin) / square;
-                    free.iter().for_each(|&k| p[k] = (p[k] - step * gradient[k]).clamp(lower[k], upper[k]));
+                if square == 0.0 {
+                    return None;
                 }
+                let step = (excess + margin) / square;
+                free.iter().for_each(|&k| p[k] = (p[k] - step * gradient[k]).clamp(lower[k], upper[k]));
             }
             if is_within {
-                break;
+                return Some(p);
             }
         }
-        p
+        None
     }
 }
 
 impl Run<'_> {
-    /// Of the designs beyond their bounds by little, the one that gains most on a best one within them.
-    pub(super) fn missed(&self) -> Option<&NearMiss> {
-        self.missed_at().map(|k| &self.near_misses[k])
-    }
-
-    fn missed_at(&self) -> Option<usize> {
-        let (_, best) = self.incumbent_values().filter(|(violation, _)| *violation == 0.0)?;
-        let gains = self
-            .near_misses
-            .iter()
-            .enumerate()
-            .filter_map(|(k, miss)| Some((k, miss.gain(self.goal, best)?)));
+    /// Of the designs beyond their bounds by little, the one that gains most on the best one.
+    pub(super) fn missed(&self, untried: bool) -> Option<usize> {
+        let best = self.incumbent_values()?;
+        let wanted =
+            self.near_misses.iter().enumerate().filter(|(_, miss)| !(untried && miss.has_been_tried));
+        let gains = wanted.filter_map(|(k, miss)| Some((k, miss.gain(self.goal, best)?)));
         gains.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
     }
 
-    /// Whether a step back within the bounds is worth an evaluation.
-    pub(super) fn has_missed(&self) -> bool {
-        self.missed().is_some_and(|miss| !miss.has_been_tried)
+    /// The next step back that the mesh carries, with the number of its miss. What it does not carry is not tried again.
+    pub(super) fn next_step_back(&mut self) -> Result<Option<(usize, Carriage)>, Stop> {
+        while let Some(k) = self.missed(true) {
+            let (lower, upper) = (self.shape().lower(), self.shape().upper());
+            if let Some(design) = self.near_misses[k].stepped_back(lower, upper) {
+                match self.carry(&design) {
+                    Ok(carried) if !carried.is_cut() => return Ok(Some((k, carried))),
+                    Ok(_) | Err(Stop::Mesh(_)) => {}
+                    Err(other) => return Err(other),
+                }
+            }
+            self.near_misses[k].has_been_tried = true;
+        }
+        Ok(None)
     }
 
     /// Where a search ends and a design beyond its bounds by little is far better than the best one within them: evaluates it a
-    /// step back within them. The search goes on from there where that is a gain; else the reason why it ends.
+    /// step back within them. The search goes on from there where that is a gain, or where evaluations are left that a limit had
+    /// ended; else the reason why it ends.
     ///
     /// # Errors
-    /// As an evaluation.
+    /// As an evaluation; one that fails for its numbers leaves the search at its end.
     pub(super) fn step_back(&mut self, reason: StopReason) -> Result<Option<StopReason>, Error> {
-        let is_of_method =
-            !matches!(reason, StopReason::Interrupted | StopReason::MaxTime | StopReason::NumericalFailure);
-        let Some(k) = self.missed_at().filter(|_| is_of_method && self.has_missed()) else {
+        let is_limit = reason == StopReason::MaxEvaluations;
+        let may_go_on = is_limit
+            || reason.is_converged()
+            || matches!(
+                reason,
+                StopReason::RoundoffLimited | StopReason::MethodStalled | StopReason::MeshLimited
+            );
+        if !may_go_on || self.missed(true).is_none() {
             return Ok(Some(reason));
-        };
-        let (lower, upper) = (self.shape().lower(), self.shape().upper());
-        let design = self.near_misses[k].stepped_back(lower, upper);
-        let before = self.best_evaluation();
-        self.is_stepping_back = true;
-        let limit = self.evaluated(&design);
-        self.is_stepping_back = false;
-        if let Some(limit) = limit? {
-            return Ok(Some(limit));
         }
-        let missed = &mut self.near_misses[k];
-        missed.has_been_tried = true;
-        let (evaluation, excess) = (missed.evaluation, missed.worst.1);
+        if !self.is_replaying() {
+            match self.limit_reached() {
+                Some(StopReason::Interrupted) => return Ok(Some(StopReason::Interrupted)),
+                Some(_) => return Ok(Some(reason)),
+                None if self.evaluations >= self.settings.max_evaluations => return Ok(Some(reason)),
+                None => {}
+            }
+        }
+        self.stepping_back = Some(reason);
+        let has_gained = self.evaluated_step_back();
+        self.stepping_back = None;
+        match has_gained {
+            Ok(Some(false)) if is_limit => Ok(None),
+            Ok(Some(true)) => Ok(None),
+            Ok(_) => Ok(Some(reason)),
+            Err(Stop::Limit(limit)) => Ok(Some(limit)),
+            Err(Stop::Error(error)) if error.is_numerical() => {
+                self.warn(&error.to_string());
+                Ok(Some(reason))
+            }
+            Err(Stop::Error(error)) => Err(*error),
+            Err(Stop::Mesh(_) | Stop::CutShort) => Ok(Some(reason)),
+        }
+    }
+
+    /// Whether the next step back is a gain; `None` where there is none.
+    fn evaluated_step_back(&mut self) -> Result<Option<bool>, Stop> {
+        let Some((k, carried)) = self.next_step_back()? else { return Ok(None) };
+        let before = self.best_evaluation();
+        self.near_misses[k].has_been_tried = true;
+        let (evaluation, excess) = (self.near_misses[k].evaluation, self.near_misses[k].worst.1);
+        self.sample_of(&carried.design, (&carried.moved, carried.seconds))?;
         let has_gained = self.best_evaluation() != before;
-        let outcome = if has_gained { "is the best design" } else { "is no gain" };
+        if has_gained {
+            self.is_held_back = carried.is_held_back();
+        }
+        let outcome = if has_gained { "the best one now" } else { "no gain" };
         self.observer.note(&format!(
-            "evaluation {evaluation} was beyond a bound by {excess:.1e} of it: what is a step back within its bounds {outcome}"
+            "evaluation {evaluation} was beyond a bound by {excess:.1e} of it; the design a step back within its bounds is {outcome}"
         ));
-        let is_over = !has_gained || self.evaluations >= self.settings.max_evaluations;
-        Ok(is_over.then_some(reason))
+        Ok(Some(has_gained))
     }
 }
 
@@ -154,15 +192,17 @@ mod tests {
         // x + 2y <= 1 by 1e-4 too much, and 3x <= 1 with no room.
         let miss = missed(&[0.333, 0.3335], &[(1e-4, vec![1.0, 2.0]), (0.0, vec![3.0, 0.0])]);
         assert_eq!(miss.worst, (0, 1e-4));
-        let p = miss.stepped_back(&[0.0; 2], &[1.0; 2]);
+        let p = miss.stepped_back(&[0.0; 2], &[1.0; 2]).expect("there is room");
         let [dx, dy] = [p[0] - 0.333, p[1] - 0.3335];
         assert!(1e-4 + dx + 2.0 * dy <= 0.0 && 3.0 * dx <= 1e-6, "{dx} {dy}");
         assert!(dx.hypot(dy) < 1.1e-4 / 5.0_f64.sqrt(), "{dx} {dy}");
         // Where one variable is at its bound, the other goes all the way.
-        let p = miss.stepped_back(&[0.0, 0.3335], &[1.0; 2]);
+        let p = miss.stepped_back(&[0.0, 0.3335], &[1.0; 2]).expect("there is room");
         assert!(p[1] == 0.3335 && (0.333 - p[0] - 1e-4).abs() < 2e-6, "{p:?}");
-        // Where none can go, the design stays.
-        assert_eq!(miss.stepped_back(&[0.333, 0.3335], &[1.0; 2]), [0.333, 0.3335]);
+        // Where none can go, or bounds oppose each other, there is none.
+        assert_eq!(miss.stepped_back(&[0.333, 0.3335], &[1.0; 2]), None);
+        let opposed = missed(&[0.5], &[(1e-4, vec![1.0]), (1e-4, vec![-1.0])]);
+        assert_eq!(opposed.stepped_back(&[0.0], &[1.0]), None);
     }
 
     #[test]
@@ -173,9 +213,10 @@ mod tests {
         };
         assert!(of(1e-7).is_none() && of(2e-3).is_none());
         let miss = NearMiss { objective: 0.9, ..of(1e-4).expect("near") };
-        assert_eq!(miss.gain(Goal::Maximise, 1.0), None);
-        assert!((miss.gain(Goal::Minimise, 1.0).expect("a gain") - 0.1).abs() < 1e-15);
-        // Less than a hundred times the excess.
-        assert_eq!(miss.gain(Goal::Minimise, 0.905), None);
+        assert_eq!(miss.gain(Goal::Maximise, (0.0, 1.0)), None);
+        assert!((miss.gain(Goal::Minimise, (0.0, 1.0)).expect("a gain") - 0.1).abs() < 1e-15);
+        // Less than a hundred times the excess; but any that keeps the bounds is better than one that does not.
+        assert_eq!(miss.gain(Goal::Minimise, (0.0, 0.905)), None);
+        assert!(miss.gain(Goal::Minimise, (1e-5, 0.8)).is_some());
     }
 }

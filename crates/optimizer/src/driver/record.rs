@@ -4,6 +4,7 @@ use fluxmorph_solver::linear::Method;
 use serde::{Deserialize, Serialize};
 
 use super::evaluation::Evaluation;
+use super::stop_reason::StopReason;
 use crate::problem::Timings;
 
 /// One evaluation with everything that a resumed run needs of it.
@@ -13,9 +14,9 @@ pub struct Record {
     pub row: Evaluation,
     /// Whether it was the best until then.
     pub improved: bool,
-    /// Whether the driver asked for it and no method: a step back within the bounds.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub stepped_back: bool,
+    /// Where no method asked for it, but it is a step back within the bounds: why the search before it ended.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stepped_back: Option<StopReason>,
     /// The design variables [m].
     pub design: Vec<f64>,
     /// dF/dp [unit of F per m].

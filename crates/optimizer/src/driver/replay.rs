@@ -27,13 +27,11 @@ impl Run<'_> {
         follows && pairs().all(|(was, is)| was.to_bits() == is.to_bits())
     }
 
-    /// Ends a search where the run had come to its last evaluation, which a step back took, and now may be allowed more.
+    /// Ends a search where the run had come to its last evaluation, which a step back took: now there may be more of them.
     pub(super) fn check_replay(&self) -> Result<(), Stop> {
-        let took_it = self.next.as_ref().is_some_and(|record| record.stepped_back);
-        if took_it && !self.is_stepping_back {
-            return Err(Stop::Limit(StopReason::MaxEvaluations));
-        }
-        Ok(())
+        let stepped_back = self.next.as_ref().and_then(|record| record.stepped_back);
+        let limit = stepped_back.filter(|&reason| reason == StopReason::MaxEvaluations);
+        limit.map_or(Ok(()), |limit| Err(Stop::Limit(limit)))
     }
 
     /// Why a record is not the answer to what the method asks for.

@@ -47,8 +47,8 @@ pub(super) struct Run<'a> {
     promised: Option<f64>,
     /// Designs beyond a bound by little, in the order of their evaluations.
     pub(super) near_misses: Vec<NearMiss>,
-    /// Whether one of them is evaluated a step back.
-    pub(super) is_stepping_back: bool,
+    /// While one of them is evaluated a step back: why the search before it ended.
+    pub(super) stepping_back: Option<StopReason>,
     /// Times the mesh has been refined.
     pub(super) level: usize,
     /// Evaluations on coarser meshes.
@@ -92,7 +92,7 @@ impl<'a> Run<'a> {
             timings: Timings::default(),
             promised: None,
             near_misses: Vec::new(),
-            is_stepping_back: false,
+            stepping_back: None,
             level: 0,
             first_evaluation: 0,
             is_shared_out,
@@ -181,14 +181,12 @@ impl<'a> Run<'a> {
     }
 
     pub(super) fn check_limits(&mut self) -> Result<(), Stop> {
+        let left = self.settings.max_evaluations.saturating_sub(self.evaluations);
         let reason = match self.limit_reached() {
             Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
+            _ if left == 0 => Some(StopReason::MaxEvaluations),
             // The last one is for a step back within the bounds.
-            _ if self.evaluations + usize::from(!self.is_stepping_back && self.has_missed())
-                >= self.settings.max_evaluations =>
-            {
-                Some(StopReason::MaxEvaluations)
-            }
+            None if left == 1 && self.next_step_back()?.is_some() => Some(StopReason::MaxEvaluations),
             reason => reason,
         };
         reason.map_or(Ok(()), |reason| Err(Stop::Limit(reason)))
@@ -231,6 +229,8 @@ impl<'a> Run<'a> {
                 field: field(),
             });
         }
+        let (goal, values) = (self.goal, self.incumbent_values());
+        self.near_misses.retain(|miss| values.is_none_or(|best| miss.gain(goal, best).is_some()));
     }
 
     fn promised_gain(&self, sample: &Sample, design: &[f64]) -> f64 {
@@ -271,7 +271,8 @@ impl<'a> Run<'a> {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }
-        let missed = self.missed().map(|miss| (miss.evaluation, miss.objective, miss.worst));
+        let missed = self.missed(false).map(|k| &self.near_misses[k]);
+        let missed = missed.map(|miss| (miss.evaluation, miss.objective, miss.worst));
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };
@@ -288,7 +289,7 @@ impl<'a> Run<'a> {
                 names.join(", of ")
             ));
         }
-        if let Some((evaluation, objective, (k, excess))) = missed {
+        if let Some((evaluation, objective, (k, excess))) = missed.filter(|_| best.violation == 0.0) {
             warnings.push(format!(
                 "evaluation {evaluation} has an objective of {objective:.6e}, against {:.6e} of the best design, and does not count: it is \
                  beyond the bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \

@@ -49,7 +49,7 @@ impl Run<'_> {
     }
 
     /// The limit that an evaluation runs into, if it does.
-    pub(super) fn evaluated(&mut self, p: &[f64]) -> Result<Option<StopReason>, Error> {
+    fn evaluated(&mut self, p: &[f64]) -> Result<Option<StopReason>, Error> {
         match self.evaluate(p) {
             Ok(_) | Err(Stop::CutShort) => Ok(None),
             Err(Stop::Limit(reason)) => Ok(Some(reason)),

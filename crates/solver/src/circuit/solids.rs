@@ -5,10 +5,10 @@
 //!
 //! `[ K  c ; cᵀ  d ] [ u ; U ] = [ f ; I ]`,  `c = Σ K_e g`,  `d = Σ gᵀ K_e g = jω∫σ|∇χ|²`:
 //!
-//! complex symmetric as `K` is. `∇χ` has no curl, so that nothing but conduction sees it, and `c` and `d` are made of that part of
-//! `K_e` alone: where a conductor is weak, what rounding leaves of its curl would be far above the flux linkage. `U` stands behind the unknowns of the
-//! field, wherever these are. Of a conductor as a coil the load of 1 A is 1 in this row, and its flux linkage `V/(jω)` is `U`:
-//! its imaginary part is what the resistance takes. Segments in series are such conductors each, with the same current.
+//! complex symmetric as `K` is. `∇χ` has no curl, so that nothing but conduction sees it, and `c` and `d` are made of that part
+//! of `K_e` alone: in a weak conductor rounding of the curl would be far above the flux linkage. `U` stands behind the unknowns
+//! of the field, wherever these are. Of a conductor as a coil the load of 1 A is 1 in this row, and its flux linkage `V/(jω)` is
+//! `U`: its imaginary part is what the resistance takes. Segments in series are such conductors each, with the same current.
 //!
 //! At 0 Hz the current has the distribution of conduction and is a source.
 
@@ -118,7 +118,8 @@ impl Solids {
         terms.map(|(values, g)| g * values[self.component]).sum()
     }
 
-    /// The rows on one mesh: `times` is the product of what conduction has of the matrix of an element, `scatter` adds its result to a load.
+    /// The rows on one mesh: `times` is the product of what conduction has of the matrix of an element, `scatter` adds its
+    /// result to a load.
     pub(crate) fn rows(
         &self,
         unknown_count: usize,

@@ -23,7 +23,6 @@ use crate::error::SolverError;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
-use crate::surface::SurfaceTerm;
 
 /// A component of force or torque: the work per unit of a rigid motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,8 +75,8 @@ impl Force {
     /// The force on the body that some regions make up.
     ///
     /// # Errors
-    /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not free, or where it
-    /// is itself in the shell of open space.
+    /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not
+    /// free, [`SolverError::ForceInShell`] where they or the body are in the shell of open space.
     pub fn new(
         model: &FieldModel,
         mesh: &Mesh,
@@ -104,10 +103,12 @@ impl Force {
             place: fluxmorph_geometry::tet4::centroid(mesh.vertices(e)),
             what,
         };
-        for e in topology.elements().filter(inside).chain(layer.iter().copied()) {
-            if model.is_open(e) {
-                return Err(fault(e, "the shell of open space"));
-            }
+        let around = layer.iter().copied();
+        if let Some(e) = topology.elements().filter(inside).chain(around).find(|&e| model.is_open(e)) {
+            return Err(SolverError::ForceInShell {
+                body: name.to_owned(),
+                place: fluxmorph_geometry::tet4::centroid(mesh.vertices(e)),
+            });
         }
         for &e in &layer {
             if model.curve_of(e).is_some() {
@@ -208,9 +209,8 @@ fn conditioned(model: &FieldModel) -> impl Iterator<Item = (NodeId, Point)> + '_
 /// The nodes of outer faces of which nothing is said, with the normals of these: `n × H = 0` there, as on a flux-normal plane.
 fn natural(model: &FieldModel, mesh: &Mesh) -> Result<impl Iterator<Item = (NodeId, Point)>, SolverError> {
     let topology = model.topology();
-    // Jumps of the reluctivity are no condition.
-    let conditioned = model.surface().filter(|(_, term)| !matches!(term, SurfaceTerm::Interface(_)));
-    let mut with_condition: HashSet<_> = conditioned.map(|(face, _)| face_key(face)).collect();
+    let conductors = model.conductors().iter().flat_map(|conductor| &conductor.surface);
+    let mut with_condition: HashSet<_> = conductors.map(|face| face_key(*face)).collect();
     for (name, _) in &model.setup().boundaries {
         with_condition.extend(topology.surface(name)?.iter().map(|face| face_key(*face)));
     }
