@@ -234,7 +234,7 @@ fn a_force_is_not_taken_in_the_shell_of_open_space() {
     assert!(shell.stderr.contains("the body touches or holds the shell of open space"), "{}", shell.stderr);
 }
 
-/// Rings in cells of their section, of twice and of ten times that have 10, 17 and 37 % too little.
+/// Rings in cells of their width, of twice and of ten times that have 10, 17 and 37 % too little.
 #[test]
 fn a_winding_thinner_than_its_elements_is_said_to_have_too_little_inductance() {
     let with = |sets: &[&str]| {

@@ -376,15 +376,13 @@ fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
             let faces = faces_of(topology, [surface.as_str()]);
             outside.iter().any(|face| faces.contains(&face_key(*face)) && goes_across(face))
         });
-        let named = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
-        let mut natural = outside.iter().filter(|face| !named.contains(&face_key(**face)));
-        let place = |face: &[NodeId; 3]| millimetres(centroid(face.map(|node| mesh.point(node))));
-        let cut = match cut {
-            Some(surface) => Some(format!("the surface `{surface}`")),
-            None => natural
-                .find(|face| goes_across(face))
-                .map(|face| format!("the outer face at {}, which has no condition,", place(face))),
+        let natural = || {
+            let named = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
+            let face = outside.iter().find(|face| !named.contains(&face_key(**face)) && goes_across(face))?;
+            let place = millimetres(centroid(face.map(|node| mesh.point(node))));
+            Some(format!("the outer face at {place}, which has no condition,"))
         };
+        let cut = cut.map(|surface| format!("the surface `{surface}`")).or_else(natural);
         if let Some(surface) = cut {
             warnings.push(format!(
                 "{path}: {surface} cuts the body `{}`, and what is computed across it is that on the free faces of \

@@ -91,18 +91,27 @@ impl NearMiss {
 }
 
 impl Run<'_> {
-    /// Of the designs beyond their bounds by little, the one that gains most on the best one.
-    pub(super) fn missed(&self, untried: bool) -> Option<usize> {
+    /// Of the designs beyond their bounds by little that are `wanted`, the one that gains most on the best one.
+    fn greatest_miss(&self, wanted: impl Fn(&NearMiss) -> bool) -> Option<usize> {
         let best = self.incumbent_values()?;
-        let wanted =
-            self.near_misses.iter().enumerate().filter(|(_, miss)| !(untried && miss.has_been_tried));
-        let gains = wanted.filter_map(|(k, miss)| Some((k, miss.gain(self.goal, best)?)));
+        let misses = self.near_misses.iter().enumerate().filter(|(_, miss)| wanted(miss));
+        let gains = misses.filter_map(|(k, miss)| Some((k, miss.gain(self.goal, best)?)));
         gains.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
+    }
+
+    /// The one that gains most.
+    pub(super) fn missed(&self) -> Option<&NearMiss> {
+        self.greatest_miss(|_| true).map(|k| &self.near_misses[k])
+    }
+
+    /// The one that gains most of those whose step back has not been tried.
+    fn untried(&self) -> Option<usize> {
+        self.greatest_miss(|miss| !miss.has_been_tried)
     }
 
     /// The next step back that the mesh carries, with the number of its miss. What it does not carry is not tried again.
     pub(super) fn next_step_back(&mut self) -> Result<Option<(usize, Carriage)>, Stop> {
-        while let Some(k) = self.missed(true) {
+        while let Some(k) = self.untried() {
             let (lower, upper) = (self.shape().lower(), self.shape().upper());
             if let Some(design) = self.near_misses[k].stepped_back(lower, upper) {
                 match self.carry(&design) {
@@ -124,13 +133,15 @@ impl Run<'_> {
     /// As an evaluation; one that fails for its numbers leaves the search at its end.
     pub(super) fn step_back(&mut self, reason: StopReason) -> Result<Option<StopReason>, Error> {
         let is_limit = reason == StopReason::MaxEvaluations;
-        let may_go_on = is_limit
-            || reason.is_converged()
-            || matches!(
-                reason,
-                StopReason::RoundoffLimited | StopReason::MethodStalled | StopReason::MeshLimited
-            );
-        if !may_go_on || self.missed(true).is_none() {
+        let is_of_method = matches!(
+            reason,
+            StopReason::ObjectiveConverged
+                | StopReason::StepConverged
+                | StopReason::RoundoffLimited
+                | StopReason::MethodStalled
+                | StopReason::MeshLimited
+        );
+        if !(is_of_method || is_limit) || self.untried().is_none() {
             return Ok(Some(reason));
         }
         if !self.is_replaying() {
@@ -145,8 +156,7 @@ impl Run<'_> {
         let has_gained = self.evaluated_step_back();
         self.stepping_back = None;
         match has_gained {
-            Ok(Some(false)) if is_limit => Ok(None),
-            Ok(Some(true)) => Ok(None),
+            Ok(Some(has_gained)) if has_gained || is_limit => Ok(None),
             Ok(_) => Ok(Some(reason)),
             Err(Stop::Limit(limit)) => Ok(Some(limit)),
             Err(Stop::Error(error)) if error.is_numerical() => {

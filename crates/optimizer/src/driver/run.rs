@@ -271,8 +271,7 @@ impl<'a> Run<'a> {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }
-        let missed = self.missed(false).map(|k| &self.near_misses[k]);
-        let missed = missed.map(|miss| (miss.evaluation, miss.objective, miss.worst));
+        let missed = self.missed().map(|miss| (miss.evaluation, miss.objective, miss.worst));
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };

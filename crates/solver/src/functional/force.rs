@@ -10,7 +10,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use fluxmorph_geometry::directions::{beside, extend, unit};
-use fluxmorph_geometry::tet4::{Point, area_vector, cross, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use rayon::prelude::*;
@@ -89,7 +89,9 @@ impl Force {
         let inside = |e: &ElementId| regions.contains(&region_of(*e));
         let of_body = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
         let mut body: BTreeMap<NodeId, Vec<Point>> = of_body.map(|node| (node, Vec::new())).collect();
-        for (node, normal) in conditioned(model).chain(natural(model, mesh)?) {
+        let is_own = |node: &NodeId| body.contains_key(node);
+        let natural = natural(model, mesh, is_own)?;
+        for (node, normal) in conditioned(model).chain(natural) {
             body.entry(node).and_modify(|held| extend(held, normal, INDEPENDENT));
         }
         let around = body.keys().flat_map(|&node| topology.elements_around(node)).copied();
@@ -97,19 +99,17 @@ impl Force {
         if layer.is_empty() {
             return Err(SolverError::NoLayer { body: name.to_owned() });
         }
+        let place = |e: ElementId| centroid(mesh.vertices(e));
+        let mut with_layer = topology.elements().filter(inside).chain(layer.iter().copied());
+        if let Some(e) = with_layer.find(|&e| model.is_open(e)) {
+            return Err(SolverError::ForceInShell { body: name.to_owned(), place: place(e) });
+        }
         let fault = |e: ElementId, what| SolverError::Layer {
             body: name.to_owned(),
             region: topology.region_names()[region_of(e).index()].clone(),
-            place: fluxmorph_geometry::tet4::centroid(mesh.vertices(e)),
+            place: place(e),
             what,
         };
-        let around = layer.iter().copied();
-        if let Some(e) = topology.elements().filter(inside).chain(around).find(|&e| model.is_open(e)) {
-            return Err(SolverError::ForceInShell {
-                body: name.to_owned(),
-                place: fluxmorph_geometry::tet4::centroid(mesh.vertices(e)),
-            });
-        }
         for &e in &layer {
             if model.curve_of(e).is_some() {
                 return Err(fault(e, "iron with a B–H curve"));
@@ -206,21 +206,30 @@ fn conditioned(model: &FieldModel) -> impl Iterator<Item = (NodeId, Point)> + '_
     of_planes.chain(unknowns.oblique_nodes().iter().copied())
 }
 
-/// The nodes of outer faces of which nothing is said, with the normals of these: `n × H = 0` there, as on a flux-normal plane.
-fn natural(model: &FieldModel, mesh: &Mesh) -> Result<impl Iterator<Item = (NodeId, Point)>, SolverError> {
+/// The nodes of outer faces of which nothing is said, with the normals of these: `n × H = 0` there, as on a flux-normal plane. Of faces
+/// with a node that is asked for.
+fn natural(
+    model: &FieldModel,
+    mesh: &Mesh,
+    is_asked_for: impl Fn(&NodeId) -> bool,
+) -> Result<Vec<(NodeId, Point)>, SolverError> {
     let topology = model.topology();
+    let outer = topology.facets().iter().filter(|facet| facet.outside.is_none()).map(|facet| facet.nodes);
+    let mut faces: Vec<[NodeId; 3]> = outer.filter(|nodes| nodes.iter().any(&is_asked_for)).collect();
+    if faces.is_empty() {
+        return Ok(Vec::new());
+    }
     let conductors = model.conductors().iter().flat_map(|conductor| &conductor.surface);
     let mut with_condition: HashSet<_> = conductors.map(|face| face_key(*face)).collect();
     for (name, _) in &model.setup().boundaries {
         with_condition.extend(topology.surface(name)?.iter().map(|face| face_key(*face)));
     }
-    let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
-    let natural =
-        outer.map(|facet| facet.nodes).filter(move |&nodes| !with_condition.contains(&face_key(nodes)));
-    Ok(natural.flat_map(|nodes| {
+    faces.retain(|&face| !with_condition.contains(&face_key(face)));
+    let with_normal = |nodes: [NodeId; 3]| {
         let normal = unit(area_vector(nodes.map(|node| mesh.point(node))));
         nodes.map(|node| (node, normal))
-    }))
+    };
+    Ok(faces.into_iter().flat_map(with_normal).collect())
 }
 
 /// What a normal must have beside directions that are held [1] to be another one, and not of a face of the same surface, which may
