@@ -53,7 +53,7 @@ fn parts(refinement: f64) -> (usize, Vec<(&'static str, f64)>) {
     let (all, setup) = timed(|| set_up(&config, &source, Mode::Optimisation).expect("valid"));
     let shape = setup.problem.shape().expect("it has a design");
     let plate = mesh.topology().region("plate").expect("it has one");
-    let (thickness, _) = timed(|| WallThickness::measure(&mesh, plate, shape.surface()));
+    let (thickness, _) = timed(|| WallThickness::measure(&mesh, &[plate], shape.surface()));
     let mut parts = vec![
         ("mesh, generated", generated),
         ("mesh, Gmsh text", text),

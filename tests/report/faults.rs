@@ -104,6 +104,31 @@ fn without_its_mesh_file_a_run_is_still_reported() {
 }
 
 #[test]
+fn what_is_another_mesh_or_configuration_than_that_of_the_run_is_not_shown_as_its_own() {
+    let home = folder();
+    let folder = block_from_file(home.path(), "device.msh");
+    let out = folder.join("out");
+    fluxmorph(&[&"run", &folder.join("block.toml"), &"--out", &out, &"--quiet"]).completed();
+    assert!(!report(&out).contains("Not shown"));
+    let own = std::fs::read(folder.join("device.msh")).expect("read");
+    let other = block("solve", &home.path().join("third"), &[("cells = [2, 2, 1]", "cells = [2, 3, 1]")]);
+    std::fs::copy(other.join("optimum.msh"), folder.join("device.msh")).expect("copied");
+    let page = report(&out);
+    assert!(
+        page.contains("is another than that of the run: restore the file")
+            && page.contains("Not shown: the shape")
+    );
+    std::fs::write(folder.join("device.msh"), own).expect("written");
+
+    // With another title a run may be resumed, with another bound it is another one.
+    let (path, text) = (out.join("config.toml"), read_text(&out.join("config.toml")));
+    std::fs::write(&path, format!("# a remark\n{text}")).expect("written");
+    assert!(!report(&out).contains("Not shown"));
+    std::fs::write(&path, text.replace("upper = \"4 mm\"", "upper = \"5 mm\"")).expect("written");
+    report_fails(&out, 3, &["its config.toml is another than that of the run", "restore it"]);
+}
+
+#[test]
 fn a_page_that_cannot_be_written_is_an_error_that_names_it() {
     let home = folder();
     let out = block("run", home.path(), &[]);

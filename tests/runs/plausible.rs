@@ -442,6 +442,8 @@ fn surfaces_that_move_otherwise_than_they_are_said_to_are_asked_about() {
     let side = ["remesh.slide=[\"x_min\", \"y_min\"]", "remesh.fixed=[\"plate_side\"]"];
     assert!(check(&side).contains("nodes of `plate_side` in remesh.fixed"));
     assert!(!check(&[&side[..], &["design.rim=fixed"]].concat()).contains("in remesh.fixed"));
+    let slid = check(&["remesh.slide=[\"x_min\", \"y_min\", \"plate_bottom\"]"]);
+    assert!(slid.contains("`plate_bottom` in remesh.slide is a design surface"), "{slid}");
     let said = "`remesh|air` in remesh.free is a face of `air` beyond what moves: its elements there are dragged along";
     assert!(check(&["remesh.free=[\"remesh|air\"]"]).contains(said));
     // The other side of the plate moves too.
@@ -483,4 +485,34 @@ fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
         texts(&RunFolder(out.clone()).result()["warnings"]).contains("reverse its direction or minimise it")
     };
     assert!(asks("[0, 0, 1]") && !asks("[0, 0, -1]"));
+}
+
+#[test]
+fn degrees_without_their_unit_are_asked_about() {
+    let said = "phase of 14.3 turns: a number without a unit is in radians";
+    assert!(check(&["coils[0].phase=90"]).contains(said));
+    assert!(!check(&["coils[0].phase=90 deg"]).contains("radians"));
+}
+
+/// The wall beside the coil is a wall, although an element that the coil meets reaches it.
+#[test]
+fn a_near_wall_is_named_with_the_error_that_no_bar_has() {
+    let wall = |half: &str| {
+        let half = format!("coils[0].half_window=[\"{half}\", \"60 mm\"]");
+        let checked =
+            finish(command(&[&"check", &quick(), &"--json"]).args(set(&[&half]))).exits_with(0).json();
+        (checked["truncation"]["surface"].clone(), number(&checked, "/truncation/distance_m"))
+    };
+    let (far, near) = (wall("60 mm"), wall("480 mm"));
+    println!("{far:?} {near:?}");
+    assert_eq!(near.0, "x_max");
+    assert!(near.1 < 0.05 && far.1 > 0.3);
+    let home = folder();
+    let said = |out: &str, overrides: &[&str]| {
+        let out = home.path().join(out);
+        finish(command(&[&"solve", &quick(), &"--out", &out]).args(set(overrides))).exits_with(0).stderr
+    };
+    let text = "of their half diagonal: no error bar counts what it cuts off";
+    let near = ["coils[0].half_window=[\"480 mm\", \"60 mm\"]"];
+    assert!(said("near", &near).contains(text) && !said("far", &[]).contains(text));
 }

@@ -31,6 +31,7 @@ mod share;
 mod skin;
 mod soundness;
 pub(crate) mod steels;
+mod truncation;
 
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
@@ -45,6 +46,7 @@ pub(crate) use references::functionals;
 pub(crate) use refined::RefinedMesh;
 pub use skin::Audited;
 pub(crate) use skin::result_warnings;
+pub(crate) use truncation::Truncation;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

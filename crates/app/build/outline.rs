@@ -12,9 +12,9 @@ use fluxmorph_remesh::{KinematicConstraint, MotionLaw};
 use super::RefinedMesh;
 use super::elastic_body::{regions_at, remesh_setup};
 use super::names::name_faults;
-use super::shape::thickened_region;
+use super::shape::thickened_regions;
 use super::skin::{Audited, audits};
-use super::{design, field, mesh};
+use super::{design, field};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 
@@ -40,21 +40,24 @@ pub struct OutlinedDesign {
     pub surface: DesignSurface,
     /// Its triangles, each once, on nodes of `full_mesh`.
     pub triangles: Vec<[NodeId; 3]>,
-    /// The region that a positive design thickens; else those with an entry of their own at the surface; else none.
+    /// The regions that a positive design thickens; else those with an entry of their own at the surface; else none.
     pub bodies: Vec<RegionId>,
-    /// Thickness of the designed body, where it has one and its opposite face is held.
+    /// Thickness of the designed bodies, where they have one and their opposite faces are held.
     pub thickness: Option<WallThickness>,
     /// Elements of `mesh` that may move, ascending.
     pub moving: Vec<ElementId>,
 }
 
-/// Reads or generates the mesh of a configuration, refines it as a run has done, and finds its design surface.
+/// Refines the mesh of a configuration as a run has done, and finds its design surface.
 ///
 /// # Errors
 /// Faults of names and of the mesh, as [`super::set_up`]; [`MeshError::RefinementLimit`] where the memory does not suffice, and
 /// for marks that are none of the mesh's elements.
-pub fn outline(config: &Config, source: &SourceMap, marks: &[Vec<ElementId>]) -> Result<Outline, Error> {
-    let mut full_mesh = mesh::build(config, source)?.mesh;
+pub fn outline(
+    (config, source): (&Config, &SourceMap),
+    mut full_mesh: Mesh,
+    marks: &[Vec<ElementId>],
+) -> Result<Outline, Error> {
     source.check(name_faults(config, source, full_mesh.topology()))?;
     let mut carried = None;
     if !marks.is_empty() {
@@ -99,19 +102,17 @@ fn outline_design(
     };
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
-    let body = thickened_region(full_mesh, &surface, config);
+    let mut bodies = thickened_regions(full_mesh, &surface, config);
     let free = config.remesh.iter().flat_map(|remesh| &remesh.free);
     let free: BTreeSet<NodeId> =
         free.filter_map(|name| topology.surface(name).ok()).flatten().flatten().copied().collect();
     let is_held = |node: NodeId| !free.contains(&node) && surface.nodes().binary_search(&node).is_err();
-    let thickness = body
-        .and_then(|region| WallThickness::measure(full_mesh, region, &surface))
+    let thickness = WallThickness::measure(full_mesh, &bodies, &surface)
         .filter(|thickness| thickness.opposite_nodes().all(is_held));
     let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
-    let bodies = match body {
-        Some(region) => vec![region],
-        None => regions_at(full_mesh, surface.nodes()).into_iter().filter(has_entry).collect(),
-    };
+    if bodies.is_empty() {
+        bodies = regions_at(full_mesh, surface.nodes()).into_iter().filter(has_entry).collect();
+    }
     let moving = match &config.remesh {
         Some(remesh) => {
             let nodes: Vec<NodeId> =
@@ -135,7 +136,7 @@ fn outline_design(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::{Mode, set_up};
+    use crate::build::{Mode, build_mesh, set_up};
 
     fn shield(name: &str) -> (Config, SourceMap) {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs").join(name);
@@ -146,7 +147,8 @@ mod tests {
     fn the_outline_is_that_of_the_problem() {
         for name in ["shield.toml", "shield_impedance.toml"] {
             let (config, source) = shield(name);
-            let outline = outline(&config, &source, &[]).expect("an outline");
+            let mesh = build_mesh(&config, &source).expect("a mesh");
+            let outline = outline((&config, &source), mesh, &[]).expect("an outline");
             let setup = set_up(&config, &source, Mode::Optimisation).expect("a problem");
             assert_eq!(outline.mesh.points(), setup.problem.original().points());
             let shape = setup.problem.shape().expect("a shape");

@@ -3,6 +3,7 @@
 //! What cannot be meant is refused at its key; what is rarely meant is a warning.
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use fluxmorph_geometry::soundness::OpenPatch;
@@ -180,6 +181,7 @@ pub(super) fn warnings(
     );
     warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body)));
     warnings.extend(cut_force_warnings(config, mesh));
+    warnings.extend(phase_warnings(config));
     warnings.extend(unit_hint(config, mesh));
     warnings
 }
@@ -384,15 +386,37 @@ fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         };
         let cut = cut.map(|surface| format!("the surface `{surface}`")).or_else(natural);
         if let Some(surface) = cut {
+            let is_magnet =
+                |name: &String| config.regions.get(name).is_some_and(|own| own.remanence.is_some());
+            let of_magnet = if body.regions.iter().any(is_magnet) {
+                "; of a magnet it comes from the singular field beside the cut, and its error bar is far too small"
+            } else {
+                ""
+            };
             warnings.push(format!(
                 "{path}: {surface} cuts the body `{}`, and what is computed across it is that on the free faces of \
-                 the meshed part, without the stress in the cut; on half of a symmetric body that is not a force on anything. \
+                 the meshed part, without the stress in the cut; on half of a symmetric body that is not a force on anything{of_magnet}. \
                  Take a direction along the surface, or mesh the whole body",
                 body.name
             ));
         }
     }
     warnings
+}
+
+/// What to say of phases of more than a turn: degrees without their unit.
+fn phase_warnings(config: &Config) -> Vec<String> {
+    let own = config.coils.iter().map(|coil| ("coils", &coil.name, coil.phase));
+    let of_loads =
+        config.loads.iter().flat_map(|load| load.phase.values().map(|phase| ("loads", &load.name, *phase)));
+    let turned = own.chain(of_loads).filter(|(.., phase)| phase.abs() > TAU);
+    let text = |(table, name, phase): (&str, &String, f64)| {
+        format!(
+            "`{name}` in [[{table}]] has a phase of {:.1} turns: a number without a unit is in radians, degrees are \"90 deg\"",
+            phase / TAU
+        )
+    };
+    turned.map(text).collect()
 }
 
 /// What to say where a coil and the mesh are of such different sizes that one of their units is probably wrong.

@@ -52,9 +52,9 @@ impl Body {
         self.motion.moving()
     }
 
-    /// The name of the region that a positive design thickens.
+    /// The name of the region that a positive design thickens, where it is one.
     pub(super) fn thickened_region(&self, config: &Config, full_mesh: &Mesh) -> Option<String> {
-        let region = thickened_region(full_mesh, &self.full_surface, config)?;
+        let [region] = thickened_regions(full_mesh, &self.full_surface, config)[..] else { return None };
         Some(full_mesh.topology().region_names()[region.index()].clone())
     }
 }
@@ -78,7 +78,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         ));
     }
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
-    warnings.extend(held_warning(inputs.remesh, mesh, &surface));
+    warnings.extend(held_warning(inputs.remesh, design, mesh, &surface));
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
     warnings.extend(unused_keys(source, inputs.remesh, law));
@@ -129,8 +129,8 @@ fn side_warning(config: &Config, design: &Design, mesh: &Mesh, nodes: &[NodeId])
     })
 }
 
-/// Nodes of the design on surfaces that are said to stay.
-fn held_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
+/// Nodes of the design on surfaces that are said to stay, and design surfaces that are said to slide.
+fn held_warning(remesh: &Remesh, design: &Design, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
     let moves = |node: &NodeId| {
         let row = surface.nodes().binary_search(node).ok();
         row.is_some_and(|row| surface.directions()[row] != [0.0; 3] && !surface.rows()[row].is_empty())
@@ -146,7 +146,11 @@ fn held_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<St
             )
         })
     };
-    remesh.fixed.iter().filter_map(of).collect()
+    let sliding = remesh.slide.iter().filter(|name| design.surface.contains(name));
+    let sliding = sliding.map(|name| {
+        format!("`{name}` in remesh.slide is a design surface: its nodes move as the design says, and do not slide")
+    });
+    remesh.fixed.iter().filter_map(of).chain(sliding).collect()
 }
 
 /// Faces in `remesh.free` whose other side is no part of the elastic body.
@@ -189,8 +193,8 @@ pub(super) fn shape(
     if faults.is_empty() {
         faults.extend(held_node_fault(inputs, &surface, motion.map(), &models[0]));
     }
-    let thickness = thickened_region(full_mesh, &full_surface, config)
-        .and_then(|region| WallThickness::measure(full_mesh, region, &full_surface))
+    let bodies = thickened_regions(full_mesh, &full_surface, config);
+    let thickness = WallThickness::measure(full_mesh, &bodies, &full_surface)
         .and_then(|thickness| thickness.renumbered(&same_nodes(full_mesh, mesh)));
     let n = surface.variable_count();
     let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
@@ -219,26 +223,28 @@ pub(super) fn shape(
     Ok(shape)
 }
 
-/// The region that a positive design thickens: behind the design surface, and not air.
-pub(super) fn thickened_region(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Option<RegionId> {
+/// The regions that a positive design thickens, ascending: behind the design surface, and not air.
+pub(super) fn thickened_regions(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Vec<RegionId> {
     let topology = mesh.topology();
     let direction_at = |node: &NodeId| {
         let row = surface.nodes().binary_search(node).ok()?;
         Some(surface.directions()[row]).filter(|direction| *direction != [0.0; 3])
     };
-    let (facet, direction) = topology
-        .facets()
-        .iter()
-        .filter(|f| f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()))
-        .filter(|f| f.outside.is_some())
-        .find_map(|f| Some((f, f.nodes.iter().find_map(direction_at)?)))?;
-    let behind = |e: &ElementId| {
-        let offset = sub(centroid(mesh.vertices(*e)), centroid(facet.nodes.map(|n| mesh.point(n))));
-        dot(offset, direction) < 0.0
+    let region_behind = |facet: &Facet| {
+        let direction = facet.nodes.iter().find_map(direction_at)?;
+        let behind = |e: &ElementId| {
+            let offset = sub(centroid(mesh.vertices(*e)), centroid(facet.nodes.map(|n| mesh.point(n))));
+            dot(offset, direction) < 0.0
+        };
+        let element = std::iter::once(facet.inside).chain(facet.outside).find(behind)?;
+        Some(topology.region_of()[element.index()])
     };
-    let element = std::iter::once(facet.inside).chain(facet.outside).find(behind)?;
-    let region = topology.region_of()[element.index()];
-    config.regions.contains_key(&topology.region_names()[region.index()]).then_some(region)
+    let is_designed =
+        |f: &&Facet| f.outside.is_some() && f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok());
+    let behind: BTreeSet<RegionId> =
+        topology.facets().iter().filter(is_designed).filter_map(region_behind).collect();
+    let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
+    behind.into_iter().filter(has_entry).collect()
 }
 
 /// Refuses bounds at which nothing is left of the body: all variables there, somewhere, take more than its thickness.

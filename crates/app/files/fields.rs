@@ -22,7 +22,7 @@ pub struct FieldData<'a> {
     pub displacement: &'a [Point],
     /// dF/dx at the nodes [unit of F per m], shape `(n_nodes, 3)`; `None` is written as zeros.
     pub sensitivity: Option<&'a [Point]>,
-    /// Thickness of the designed body at its design nodes [m], zero at others, shape `(n_nodes,)`; `None`: no such array.
+    /// Thickness of the designed bodies at their design nodes [m], zero at others, shape `(n_nodes,)`; `None`: no such array.
     pub thickness: Option<&'a [f64]>,
     /// What every element adds to the estimated error of the objective [unit of F], shape `(n_tets,)`; `None`: no such array.
     pub error: Option<&'a [f64]>,
@@ -51,7 +51,7 @@ impl<'a> FieldData<'a> {
     }
 }
 
-/// Thickness of the designed body at the nodes of a design [m], where it has one.
+/// Thickness of the designed bodies at the nodes of a design [m], where they have one.
 pub fn thickness(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
     let shape = problem.shape()?;
     Some(shape.thickness()?.over_nodes(shape.surface(), &analysis.mesh))

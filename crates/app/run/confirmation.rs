@@ -108,6 +108,7 @@ impl Session<'_> {
     ) -> Option<Accuracy> {
         let shape = self.cut_shape(objective, meshes);
         let is_said = errors.is_some() || objective.is_verified_on_cut_elements();
+        self.near_wall.iter().filter(|_| is_said).for_each(|near| observer.notice(near));
         let facets = is_said.then(|| self.facets_of(shape, observer)).flatten();
         let mut accuracy = Accuracy { facets, ..Accuracy::default() };
         if !self.has_field_objective() {

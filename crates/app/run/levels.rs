@@ -193,6 +193,11 @@ impl Session<'_> {
         }
     }
 
+    /// Ends a run that has no evaluation yet once a signal came.
+    fn check_interrupted(&self) -> Result<(), OptimizerError> {
+        OptimizerError::check_interrupted(self.interrupted).map_err(|_| OptimizerError::InterruptedRun)
+    }
+
     /// Refines the mesh until the error bar of the initial design is within the tolerance, or the time is over.
     fn refine_before_search(
         &mut self,
@@ -202,8 +207,7 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
         loop {
-            OptimizerError::check_interrupted(self.interrupted)
-                .map_err(|_| OptimizerError::InterruptedRun)?;
+            self.check_interrupted()?;
             if let Some(step) = levels.next_kept(0) {
                 self.refine_again(levels, &step)?;
                 limit.restart();
@@ -223,10 +227,12 @@ impl Session<'_> {
             let problem = &self.setup.problem;
             let (moved, cache) = (problem.moved(self.initial_design())?, &mut SolverCache::default());
             let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
+            self.check_interrupted()?;
             let Some(estimate) = self.estimator().estimate(&analysis, observer) else {
                 observer.warning("without an estimated error the mesh is not refined to accuracy.tolerance");
                 return Ok(());
             };
+            self.check_interrupted()?;
             let scale = analysis.objective.map_or(f64::NAN, f64::abs);
             let of_initial = (&analysis, &estimate, scale);
             match self.refine(levels, (0, limit), of_initial, observer)? {
@@ -268,6 +274,9 @@ impl Session<'_> {
         let Some(estimate) = self.estimator().estimate(analysis, observer) else {
             return Ok((Refined::No, None));
         };
+        if (self.interrupted)() {
+            return Ok((Refined::No, Some(estimate)));
+        }
         let scale = optimised.initial.abs().max(optimised.best.objective.abs());
         let of_best = (analysis, &estimate, scale);
         let refined = self.refine(levels, (optimised.evaluations, limit), of_best, observer)?;

@@ -48,6 +48,7 @@ use crate::build::locate_error::attribute_error;
 use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::files::{
     CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements,
     RunDirectory, RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
@@ -134,6 +135,8 @@ struct Session<'a> {
     warnings: Vec<String>,
     /// Of the mesh before it was refined.
     facets: Option<CurvedFacets>,
+    /// What no estimate has of a wall that is near, in words.
+    near_wall: Option<String>,
     directory: RunDirectory,
     manifest: Manifest,
     clock: Instant,
@@ -275,8 +278,7 @@ impl Session<'_> {
         let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
         if let Err(error) = &outcome
             && self.command == "run"
-            && error.is_resumable()
-            && self.directory.holds_configuration()
+            && self.is_worth_resuming(error)
         {
             let command = resume_command(self.directory.path());
             observer.warning(&format!("what was computed is kept: resume with `{command}`"));
@@ -285,6 +287,16 @@ impl Session<'_> {
         completed?;
         observer.finished(&result);
         Ok(Concluded { result, directory: self.directory })
+    }
+
+    /// Whether a run that ended with an error can be resumed, and would not end with it again: what failed before there was an
+    /// evaluation fails before it again.
+    fn is_worth_resuming(&self, error: &Error) -> bool {
+        let has_evaluations =
+            || Journal::read_records(&self.directory).is_ok_and(|records| !records.is_empty());
+        error.is_resumable()
+            && self.directory.holds_configuration()
+            && (error.exit_code() != ExitCode::Numerical || has_evaluations())
     }
 
     fn write_configuration(&self) -> Result<(), Error> {

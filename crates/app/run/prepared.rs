@@ -7,7 +7,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 
 use super::facets::{curved_facets, is_empty};
 use super::{Options, Session, mesh_hash, table_hashes};
-use crate::build::{Mode, Setup, memory_limit, set_up_watched};
+use crate::build::{Mode, Setup, Truncation, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{CurvedFacets, LimitsInForce, Manifest, RunDirectory, surface_files};
@@ -20,6 +20,7 @@ pub(super) struct Prepared<'a> {
     source: &'a SourceMap,
     /// Of the mesh before it is refined.
     facets: Option<CurvedFacets>,
+    near_wall: Option<String>,
     options: Options<'a>,
     clock: Instant,
 }
@@ -40,7 +41,8 @@ impl<'a> Prepared<'a> {
         memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
         let facets = curved_facets(&setup.full_mesh, |name| is_empty(config, name));
-        Ok(Self { setup, config, source, facets, options, clock })
+        let near_wall = Truncation::of(&setup).and_then(|truncation| truncation.warning());
+        Ok(Self { setup, config, source, facets, near_wall, options, clock })
     }
 
     /// Takes the output directory, and writes the manifest.
@@ -71,7 +73,7 @@ impl<'a> Prepared<'a> {
         directory: RunDirectory,
         manifest: Manifest,
     ) -> Session<'a> {
-        let Self { setup, config, source, facets, options, clock } = self;
+        let Self { setup, config, source, facets, near_wall, options, clock } = self;
         let setup_seconds = clock.elapsed().as_secs_f64();
         Session {
             command,
@@ -80,6 +82,7 @@ impl<'a> Prepared<'a> {
             warnings: setup.warnings.clone(),
             setup,
             facets,
+            near_wall,
             directory,
             manifest,
             clock,

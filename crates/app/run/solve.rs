@@ -106,6 +106,8 @@ impl Session<'_> {
         exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
+        let estimate = analysis.objective.zip(estimate).filter(|_| self.has_field_objective());
+        self.near_wall.iter().filter(|_| estimate.is_some()).for_each(|near| observer.notice(near));
         Ok(RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
@@ -118,13 +120,11 @@ impl Session<'_> {
                 homogeneity: homogeneity(problem, analysis, value),
                 terms: terms(problem, analysis),
             }),
-            accuracy: analysis.objective.zip(estimate).filter(|_| self.has_field_objective()).map(
-                |(value, estimate)| Accuracy {
-                    refinements: halvings as usize,
-                    facets: self.facets_of(None, observer),
-                    ..Accuracy::of_analysis(value, estimate.objective)
-                },
-            ),
+            accuracy: estimate.map(|(value, estimate)| Accuracy {
+                refinements: halvings as usize,
+                facets: self.facets_of(None, observer),
+                ..Accuracy::of_analysis(value, estimate.objective)
+            }),
             constraints,
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         })

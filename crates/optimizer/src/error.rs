@@ -64,7 +64,7 @@ pub enum Error {
     #[error("interrupted before there was anything to keep")]
     Interrupted,
     /// A signal ended a run before an evaluation that its journal does not have.
-    #[error("interrupted before anything new was computed")]
+    #[error("interrupted before another design was evaluated")]
     InterruptedRun,
     /// A recorder could not keep an evaluation, or give one back: the error of its own.
     #[error(transparent)]

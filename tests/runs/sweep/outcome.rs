@@ -28,20 +28,23 @@ fn the_table_holds_the_numbers_of_the_results() {
     let mut lines = table.lines();
     let head = cells(lines.next().expect("a head"));
     let expected = "design.upper optimizer.max_evaluations status stop_reason evaluations objective_initial \
-                    objective_best ratio verified_ratio violated worst_quality seconds peak_memory_bytes directory";
+                    objective_best ratio verified_ratio verdict violated worst_quality seconds peak_memory_bytes directory";
     assert_eq!(head.join(" "), expected);
     let printed = ended.json();
-    let mut ratios = Vec::new();
+    let mut values = Vec::new();
     for (i, line) in lines.enumerate() {
         let row = cells(line);
         assert_eq!([&row[0], &row[1]], [["2 mm", "4 mm"][i / 2], ["2", "3"][i % 2]]);
-        let result = home.json(&format!("out/{}/result.json", row[13]));
+        let result = home.json(&format!("out/{}/result.json", row[14]));
         let pointers = "/status /stop_reason /evaluations /objective/initial /objective/best /objective/ratio \
-                        /objective/verified_ratio /violated /mesh/worst_quality_final /timings_s/total /peak_memory_bytes";
+                        /objective/verified_ratio /accuracy/verdict /violated /mesh/worst_quality_final /timings_s/total /peak_memory_bytes";
         for (pointer, cell) in pointers.split(' ').zip(&row[2..]) {
             // No bound is violated here.
-            let value =
-                if pointer == "/violated" { &Value::Null } else { result.pointer(pointer).expect(pointer) };
+            let value = match pointer {
+                "/violated" => &Value::Null,
+                "/accuracy/verdict" => result.pointer(pointer).unwrap_or(&Value::Null),
+                _ => result.pointer(pointer).expect(pointer),
+            };
             let text = match value {
                 Value::Null => String::new(),
                 Value::String(text) => text.clone(),
@@ -50,16 +53,33 @@ fn the_table_holds_the_numbers_of_the_results() {
             assert_eq!(*cell, text, "{pointer}");
         }
         assert_eq!(printed["combinations"][i]["ratio"], result["objective"]["ratio"]);
-        assert_eq!(printed["combinations"][i]["directory"], row[13].as_str());
-        ratios.push(row[7].parse::<f64>().expect("a number"));
+        assert_eq!(printed["combinations"][i]["directory"], row[14].as_str());
+        values.push(row[6].parse::<f64>().expect("a number"));
     }
-    assert_eq!(ratios.len(), 4);
-    let best = (0..4).min_by(|&a, &b| ratios[a].total_cmp(&ratios[b]));
+    assert_eq!(values.len(), 4);
+    let best = (0..4).min_by(|&a, &b| values[a].total_cmp(&values[b]));
     assert_eq!(printed["best"].as_u64(), best.map(|best| best as u64));
 }
 
 fn has(elements: &[Element], name: &str, attribute: &str, value: &str) -> bool {
     elements.iter().any(|element| element.name == name && element.get(attribute) == Some(value))
+}
+
+/// Runs that begin at different designs have ratios to different values, and of two objectives none is the better one.
+#[test]
+fn the_best_is_that_of_the_objective_and_not_of_its_ratio() {
+    let home = Home::with(&[("max_evaluations = 6", "max_evaluations = 2")]);
+    let sweep = |out: &str, set: &str| home.sweep(out, &["--set", set, "--json"]).with(1, &[]).json();
+    let begun = sweep("begun", "design.initial=0 mm,3 mm");
+    let [values, ratios] = ["objective_best", "ratio"]
+        .map(|column| [0, 1].map(|i| begun["combinations"][i][column].as_f64().expect("a number")));
+    println!("F {values:?}, F/F0 {ratios:?}");
+    assert!((values[0] < values[1]) != (ratios[0] < ratios[1]), "the device tells them apart");
+    assert_eq!(begun["best"], usize::from(values[1] < values[0]));
+    assert!(home.text("begun/sweep.html").contains("Marked: the best F of the runs"));
+    assert_eq!(sweep("of_two", "objective.goal=minimise,maximise")["best"], Value::Null);
+    let page = home.text("of_two/sweep.html");
+    assert!(page.contains("none is marked") && !page.contains("drawn bold"));
 }
 
 #[test]

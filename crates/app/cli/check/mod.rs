@@ -8,7 +8,6 @@ mod estimate;
 mod reach;
 mod summary;
 mod text;
-mod truncation;
 
 use std::io::Write;
 

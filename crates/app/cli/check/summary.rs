@@ -17,8 +17,9 @@ use serde::Serialize;
 use super::advice::advice;
 use super::estimate::EstimateSummary;
 use super::reach::Reach;
-use super::truncation::Truncation;
-use crate::build::{Audited, Mode, Setup, memory_limit, motion_in_words, set_up_watched, stiffness_policy};
+use crate::build::{
+    Audited, Mode, Setup, Truncation, memory_limit, motion_in_words, set_up_watched, stiffness_policy,
+};
 use crate::config::{
     self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, Material, MeshConfig, Objective,
     Open, Optimizer, Probe, RegionModel, Remesh, SourceMap,

@@ -175,7 +175,7 @@ pub enum Limit {
         #[serde(flatten)]
         bound: ValueBound,
     },
-    /// Thickness of the designed body along the direction of the design; at least one bound.
+    /// Thickness of the designed bodies along the direction of the design; at least one bound.
     Thickness {
         /// The word itself.
         kind: ThicknessKind,

@@ -8,7 +8,7 @@ use crate::config::value::choice::{Choice, choice};
 choice! {
     /// The kind of a constraint on the thickness.
     pub enum ThicknessKind {
-        /// Thickness of the designed body along the direction of the design [m].
+        /// Thickness of the designed bodies, each behind its own part of the design surface, along the direction of the design [m].
         Thickness = "thickness",
     }
 }

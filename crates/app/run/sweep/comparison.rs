@@ -8,7 +8,9 @@ use serde_json::Value;
 use super::{Criterion, Layout, Planned, Sweep, front, page, state};
 use crate::config::Goal;
 use crate::error::Error;
-use crate::files::{Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, csv_text};
+use crate::files::{
+    Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, Verdict, csv_text,
+};
 use crate::run::journal::Journal;
 
 /// The results of all combinations, in their order.
@@ -18,7 +20,7 @@ pub struct Comparison {
     pub directory: String,
     /// The swept keys.
     pub keys: Vec<String>,
-    /// The row of the best objective relative to its start; `None` where nothing can be compared.
+    /// The row of the best objective; `None` where nothing can be compared.
     pub best: Option<usize>,
     /// The two quantities that the runs trade for each other; empty where they trade none.
     pub criteria: Vec<Criterion>,
@@ -26,6 +28,9 @@ pub struct Comparison {
     pub front: Vec<usize>,
     /// The rows.
     pub combinations: Vec<Row>,
+    /// Which way the objective is better that all runs have; `None` where theirs differ.
+    #[serde(skip)]
+    goal: Option<Goal>,
 }
 
 /// One combination.
@@ -47,6 +52,8 @@ pub struct Row {
     pub ratio: Option<f64>,
     /// The same on a freshly generated mesh.
     pub verified_ratio: Option<f64>,
+    /// Whether the gain is the shape's; `None` where it was not checked.
+    pub verdict: Option<Verdict>,
     /// Names of the constraints that the best design violates.
     pub violated: Vec<String>,
     /// The criteria at the best design, in SI; empty where there are none, or no result.
@@ -62,9 +69,6 @@ pub struct Row {
     /// Evaluation and ratio, as they came.
     #[serde(skip)]
     pub(super) curve: Vec<[f64; 2]>,
-    /// Which way the objective is better.
-    #[serde(skip)]
-    goal: Option<Goal>,
     /// Whether there is a page about the run.
     #[serde(skip)]
     pub(super) is_reported: bool,
@@ -84,6 +88,7 @@ impl Comparison {
             criteria: criteria(&sweep.combinations),
             front: Vec::new(),
             combinations: rows.collect::<Result<_, _>>()?,
+            goal: common_goal(&sweep.combinations),
         };
         comparison.compare();
         Ok(comparison)
@@ -143,30 +148,37 @@ impl Comparison {
         table
     }
 
-    /// The best of the rows that keep their constraints and want the same.
+    /// What the runs are compared by, if it is a number: the objective where all have the same, and else its share of their own
+    /// beginnings.
+    pub(super) fn measured(&self, row: &Row) -> Option<f64> {
+        let value = if self.goal.is_some() { row.objective_best } else { row.ratio };
+        value.filter(|value| value.is_finite())
+    }
+
+    /// That, in letters.
+    pub(super) fn measure(&self) -> &'static str {
+        if self.goal.is_some() { "F" } else { "F / F₀" }
+    }
+
+    /// The best of the rows that keep their constraints, where all have the same objective. Their beginnings may differ, so that the
+    /// ratio says nothing.
     fn find_best(&self) -> Option<usize> {
-        let goal = self.combinations.first()?.goal?;
-        if self.combinations.iter().any(|row| row.goal != Some(goal)) {
-            return None;
-        }
-        let known = |(index, row): (usize, &Row)| Some((index, row.ratio.filter(|ratio| ratio.is_finite())?));
+        let sign = if self.goal? == Goal::Minimise { 1.0 } else { -1.0 };
         let sound = self.combinations.iter().enumerate().filter(|(_, row)| row.violated.is_empty());
-        let better = |a: f64, b: f64| match goal {
-            Goal::Minimise => a < b,
-            Goal::Maximise => a > b,
-        };
-        let mut best: Option<(usize, f64)> = None;
-        for (index, ratio) in sound.filter_map(known) {
-            if best.is_none_or(|(_, known)| better(ratio, known)) {
-                best = Some((index, ratio));
-            }
-        }
-        best.map(|(index, _)| index)
+        let known = sound.filter_map(|(index, row)| Some((index, sign * self.measured(row)?)));
+        known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
     }
 }
 
+/// The goal of runs that have the same objective.
+fn common_goal(combinations: &[Planned]) -> Option<Goal> {
+    let first = combinations.first()?.objective.as_ref()?;
+    let same = combinations.iter().all(|planned| planned.objective.as_ref() == Some(first));
+    same.then_some(first.goal)
+}
+
 /// Columns of `sweep.csv` after those of the keys.
-const COLUMNS: [&str; 12] = [
+const COLUMNS: [&str; 13] = [
     "status",
     "stop_reason",
     "evaluations",
@@ -174,6 +186,7 @@ const COLUMNS: [&str; 12] = [
     "objective_best",
     "ratio",
     "verified_ratio",
+    "verdict",
     "violated",
     "worst_quality",
     "seconds",
@@ -207,6 +220,7 @@ impl Row {
             objective_best: objective.map(|objective| objective.best),
             ratio: objective.map(|objective| objective.ratio),
             verified_ratio: objective.and_then(|objective| objective.verified_ratio),
+            verdict: result.as_ref().and_then(|result| result.accuracy.as_ref()?.verdict),
             criteria: result.as_ref().and_then(|result| values(planned, result)).unwrap_or_default(),
             worst_quality: of_result(|result| Some(result.mesh.worst_quality_final)),
             seconds: of_result(|result| result.timings_s.get("total").copied()),
@@ -222,7 +236,6 @@ impl Row {
         Self {
             values: planned.combination.values.clone(),
             directory: planned.combination.name.clone(),
-            goal: Some(planned.goal),
             ..Self::default()
         }
     }

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use super::comparison::{Comparison, Row};
 use super::{Criterion, Sweep, plots};
-use crate::files::{RunStatus, StopReason};
+use crate::files::{RunStatus, StopReason, Verdict};
 use crate::show::report::markup::{Card, address, document, footer, header, note, section, table};
 use crate::show::report::ticks::{duration, number};
 
@@ -85,8 +85,10 @@ fn lead(sweep: &Sweep) -> String {
 fn cards(comparison: &Comparison, ended: usize) -> Vec<Card> {
     let rows = &comparison.combinations;
     let mut all = vec![("combinations", rows.len().to_string(), format!("{ended} have ended"))];
-    if let Some((row, ratio)) = comparison.best.and_then(|best| Some((&rows[best], rows[best].ratio?))) {
-        all.push(("best F / F₀", number(ratio, 4), row.directory.clone()));
+    if let Some((row, value)) =
+        comparison.best.and_then(|best| Some((&rows[best], rows[best].objective_best?)))
+    {
+        all.push(("best F", number(value, 4), row.directory.clone()));
     }
     let evaluations: usize = rows.iter().filter_map(|row| row.evaluations).sum();
     all.push(("evaluations", evaluations.to_string(), "of all runs".to_owned()));
@@ -101,14 +103,16 @@ impl Row {
         matches!(self.status, Some(RunStatus::Converged | RunStatus::Stopped))
     }
 
-    /// How far it is, in words, with the constraints that its best design violates.
+    /// How far it is, in words, with the constraints that its best design violates and what came of the check of its gain.
     pub fn describe(&self) -> String {
-        let ended = self.how_it_ended();
-        if self.violated.is_empty() {
-            ended
-        } else {
-            format!("{ended}, violates {}", self.violated.join(", "))
+        let mut words = self.how_it_ended();
+        if !self.violated.is_empty() {
+            words += &format!(", violates {}", self.violated.join(", "));
         }
+        if self.verdict == Some(Verdict::NotConfirmed) {
+            words += ", gain not confirmed";
+        }
+        words
     }
 
     fn how_it_ended(&self) -> String {
@@ -149,7 +153,9 @@ fn rows(comparison: &Comparison) -> Markup {
         @if shown < all.len() { (note(&format!("The first {shown} of {} rows; sweep.csv has all.", all.len()))) }
         (table(&head, &rows, comparison.best))
         @if comparison.best.is_some() {
-            (note("Marked: the best F / F₀ of the runs that keep their constraints."))
+            (note("Marked: the best F of the runs that keep their constraints."))
+        } @else {
+            (note("The runs do not have the same objective, or no result yet that keeps the constraints: none is marked."))
         }
     }
 }

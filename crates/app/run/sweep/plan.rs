@@ -6,7 +6,9 @@ use std::path::{Path, PathBuf};
 use super::state::{fingerprint, mesh_file};
 use super::{Combination, Criterion, Setting, SweepError, combinations};
 use crate::build::{memory_limit, with_names};
-use crate::config::{Config, ConfigError, DiagnosticReport, Goal, OutputNamedBy, SourceMap, resolved_toml};
+use crate::config::{
+    Config, ConfigError, DiagnosticReport, Objective, OutputNamedBy, SourceMap, resolved_toml,
+};
 use crate::error::Error;
 use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex};
 use crate::run::RunLimits;
@@ -72,8 +74,8 @@ pub struct Planned {
     pub mesh: Option<PathBuf>,
     /// When it ends at the latest.
     pub limits: LimitsInForce,
-    /// Which way its objective is better.
-    pub goal: Goal,
+    /// What is optimised.
+    pub objective: Option<Objective>,
     /// What its result is compared by with those of the others; `None` where nothing is traded.
     pub criteria: Option<[Criterion; 2]>,
 }
@@ -114,7 +116,7 @@ impl Sweep {
                     max_evaluations: request.limits.max_evaluations.unwrap_or(configured.max_evaluations),
                     max_time_s: request.limits.max_time.or(configured.max_time_s),
                 },
-                goal: config.objective.as_ref().map_or(Goal::Minimise, |objective| objective.goal),
+                objective: config.objective.clone(),
                 criteria: Criterion::pair(&config, &settings),
             });
             first.get_or_insert((config, source));

@@ -17,34 +17,34 @@ const MOST_CURVES: usize = 24;
 /// Colours of the style sheet; with three strokes each they make [`MOST_CURVES`].
 const COLOURS: usize = 8;
 
-/// Title and figure of F / F₀ over the value, where a single key is swept over numbers of one unit.
+/// Title and figure of what the runs are compared by over the value, where a single key is swept over numbers of one unit.
 pub(super) fn over_value(comparison: &Comparison) -> Option<(String, Markup)> {
     let [key] = &comparison.keys[..] else { return None };
     let (unit, values) = numbers(&comparison.combinations)?;
     let rows = &comparison.combinations;
-    let known =
-        |(i, row): (usize, &Row)| Some((i, [values[i], row.ratio.filter(|ratio| ratio.is_finite())?]));
+    let known = |(i, row): (usize, &Row)| Some((i, [values[i], comparison.measured(row)?]));
     let mut points: Vec<(usize, [f64; 2])> = rows.iter().enumerate().filter_map(known).collect();
     points.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
     let axis = if unit.is_empty() { key.clone() } else { format!("{key} [{unit}]") };
     let describe =
-        |(i, [_, ratio]): &(usize, [f64; 2])| format!("{} at {}", number(*ratio, 4), rows[*i].values[0]);
+        |(i, [_, value]): &(usize, [f64; 2])| format!("{} at {}", number(*value, 4), rows[*i].values[0]);
     let best = points.iter().find(|(i, _)| Some(*i) == comparison.best);
     let ring = best.map_or(String::new(), |best| format!("; best (ring): {}", describe(best)));
     let (first, last) = (describe(points.first()?), describe(points.last()?));
-    let caption = format!("F / F₀ over {key}: {first}, {last}{ring}.");
+    let measure = comparison.measure();
+    let caption = format!("{measure} over {key}: {first}, {last}{ring}.");
     let x = Scale::around(points.iter().map(|(_, p)| p[0]), [LEFT + 10.0, WIDTH - RIGHT - 6.0]);
     let y = Scale::around(points.iter().map(|(_, p)| p[1]), [TOP + HEIGHT, TOP]);
-    let place = |(_, [value, ratio]): &(usize, [f64; 2])| [x.at(*value), y.at(*ratio)];
+    let place = |(_, [swept, value]): &(usize, [f64; 2])| [x.at(*swept), y.at(*value)];
     let places: Vec<[f64; 2]> = points.iter().map(place).collect();
     let content = html! {
         (grid(&x, &y, 5))
-        (axes(&x, &y, [&axis, "objective F / F₀"], [6, 5]))
+        (axes(&x, &y, [&axis, &format!("objective {measure}")], [6, 5]))
         (polyline("curve", &places))
         @for at in &places { (dot("point", *at, 2.6)) }
         @if let Some(best) = best { (dot("best", place(best), 5.0)) }
     };
-    Some((format!("F / F₀ over {key}"), figure("over-value", &caption, &content)))
+    Some((format!("{measure} over {key}"), figure("over-value", &caption, &content)))
 }
 
 /// Title and figure of two quantities that the runs trade for each other; those on the front are joined, and marked.
@@ -115,8 +115,8 @@ pub(super) fn convergence(comparison: &Comparison) -> Markup {
         _ => format!(", of {} that have begun", begun.len()),
     };
     let count = drawn.len();
-    let caption =
-        format!("F / F₀ of {count} runs up to evaluation {longest}{more}; the best run is drawn bold.");
+    let bold = if comparison.best.is_some() { "; the best run is drawn bold" } else { "" };
+    let caption = format!("F / F₀ of {count} runs up to evaluation {longest}{more}{bold}.");
     let curves: Vec<(String, &Row)> =
         drawn.iter().enumerate().map(|(k, (i, row))| (class(k, comparison.best == Some(*i)), *row)).collect();
     let curve = |row: &Row| row.curve.iter().map(|[e, r]| [x.at(*e), y.at(*r)]).collect::<Vec<_>>();

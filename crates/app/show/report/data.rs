@@ -3,17 +3,18 @@
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
+use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::io::VtuArray;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::driver::Record;
 
 use super::ReportedRun;
 use super::field_file::{contents, field_contents};
-use crate::build::{Outline, outline};
-use crate::config::{Config, FieldsKept};
+use crate::build::{Outline, build_mesh, outline};
+use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
-use crate::files::{Manifest, OutputError, Refinements, RunDirectory, RunResult};
-use crate::run::journal::Journal;
+use crate::files::{Manifest, MeshHash, OutputError, Refinements, RunDirectory, RunResult};
+use crate::run::journal::{Journal, mesh_hash};
 use crate::show::Evaluation;
 
 /// Largest configuration that is read [bytes].
@@ -81,8 +82,7 @@ impl RunData {
         // The best design is on the mesh of its level; the first evaluation there has the initial one on it.
         let level = best.and_then(|best| history.get(best)).map_or(0, |row| row.level);
         let first = history.iter().find(|row| row.level == level).map(|row| row.evaluation);
-        let outline = outline(&config, &source, &refinements.marks(level))
-            .map_err(|error| format!("the mesh cannot be rebuilt: {}", reason(&error)));
+        let outline = outline_of_run(&manifest, (&config, &source), &refinements.marks(level));
         let kept = directory.evaluations_with_fields()?;
         let fields = [first.or(Some(0)).filter(|_| manifest.command == "run"), best].map(|evaluation| {
             let Some(evaluation) = evaluation else { return Ok(Err(NO_EVALUATION.to_owned())) };
@@ -142,6 +142,22 @@ impl RunData {
     pub(super) fn row(&self, evaluation: usize) -> Option<&Evaluation> {
         self.history.iter().find(|row| row.evaluation == evaluation)
     }
+}
+
+/// Mesh and design surface of the run; why there are none where its mesh is gone, or has become another.
+fn outline_of_run(
+    manifest: &Manifest,
+    (config, source): (&Config, &SourceMap),
+    marks: &[Vec<ElementId>],
+) -> Result<Outline, String> {
+    let unbuilt = |error: Error| format!("the mesh cannot be rebuilt: {}", reason(&error));
+    let mesh = build_mesh(config, source).map_err(unbuilt)?;
+    if let Some(MeshHash { origin, blake3, .. }) = &manifest.mesh
+        && *blake3 != mesh_hash(&mesh)
+    {
+        return Err(format!("the mesh of {origin} is another than that of the run: restore the file"));
+    }
+    outline((config, source), mesh, marks).map_err(unbuilt)
 }
 
 /// The estimated error of so many elements; `None` where there is none of this mesh.

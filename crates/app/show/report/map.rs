@@ -79,7 +79,7 @@ impl SurfaceValues {
 /// Both figures with their caption.
 pub(super) fn figure(data: &RunData, outline: &Outline, design: &OutlinedDesign) -> Result<Markup, String> {
     let surface = SurfaceValues::new(data, design);
-    let after = surface.values[1].as_ref().ok_or("the best design is not known")?;
+    let after = surface.values[1].as_ref().ok_or("the best design is not known, or not one of this mesh")?;
     let [low, high] = surface.range().ok_or("no node of the design surface has a value")?;
     let scale = Scale { low, high, count: Count::Linear, pixels: [LEFT, WIDTH - RIGHT] };
     let drawing = Drawing::new(data, outline, design, scale);
@@ -210,9 +210,9 @@ fn caption(
     let names = data.config.design.as_ref().map_or(String::new(), |d| d.surface.join(", "));
     let [least, most] = extremes(after.iter().flatten().copied());
     let mut text = if surface.is_thickness {
-        let body =
-            design.bodies.first().map(|r| outline.full_mesh.topology().region_names()[r.index()].as_str());
-        format!("Thickness of {} behind the surface {names}", body.unwrap_or("the body"))
+        let regions = outline.full_mesh.topology().region_names();
+        let bodies: Vec<&str> = design.bodies.iter().map(|r| regions[r.index()].as_str()).collect();
+        format!("Thickness of {} behind the surface {names}", bodies.join(", "))
     } else {
         format!("Displacement of the surface {names} along its direction of motion")
     };

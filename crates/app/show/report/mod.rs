@@ -51,8 +51,9 @@ use data::RunData;
 
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{Disk, Manifest, RunDirectory};
+use crate::files::{Disk, Manifest, RunDirectory, blake3_hex};
 use crate::run;
+use crate::run::journal::{Journal, configuration_hash};
 
 /// A run directory that a page can be made of.
 #[derive(Debug)]
@@ -89,6 +90,12 @@ impl ReportedRun {
             ));
         }
         let (config, source) = run::configuration(&directory, &manifest)?;
+        if !is_of_run(&directory, &manifest, (&config, &source))? {
+            return Err(refused(
+                "its config.toml is another than that of the run (manifest.json has its hash): restore it"
+                    .into(),
+            ));
+        }
         Ok(Self { directory, manifest, config, source })
     }
 
@@ -113,6 +120,20 @@ impl ReportedRun {
         directory.write(&path, page.as_bytes())?;
         Ok(path)
     }
+}
+
+/// Whether a configuration is the one that a directory was made with, or one that its run may be resumed with.
+fn is_of_run(
+    directory: &RunDirectory,
+    manifest: &Manifest,
+    (config, source): (&Config, &SourceMap),
+) -> Result<bool, Error> {
+    let now = blake3_hex(source.text().as_bytes());
+    if manifest.config.as_ref().is_none_or(|own| own.blake3 == now) {
+        return Ok(true);
+    }
+    let of_run = Journal::read(directory)?.map(|contents| contents.identity.configuration);
+    Ok(of_run.is_some_and(|own| own == configuration_hash(config)))
 }
 
 /// The relative path from the folder of a file to a directory, with a slash at its end; nothing where they are the same.

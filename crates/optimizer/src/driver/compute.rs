@@ -157,8 +157,8 @@ impl Run<'_> {
         }
         if objective == 0.0 {
             return Err(Error::Optimisation {
-                cause: "the objective of the initial design is zero: there is no field to change, or its terms cancel; \
-                        check coils, regions, frequencies and weights",
+                cause: "the objective of the initial design is zero: there is no field to change, its terms cancel, or it is the deviation \
+                        within a single element; check coils, regions, frequencies and weights",
             });
         }
         let constraints = self.problem.constraints().iter().zip(measured);

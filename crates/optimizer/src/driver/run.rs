@@ -180,8 +180,19 @@ impl<'a> Run<'a> {
         is_over.then_some(StopReason::MaxTime)
     }
 
+    fn evaluations_left(&self) -> usize {
+        self.settings.max_evaluations.saturating_sub(self.evaluations)
+    }
+
+    /// Says how the search goes on, where there are evaluations left for it.
+    pub(super) fn note_going_on(&mut self, how: &str) {
+        if self.evaluations_left() > 0 {
+            self.observer.note(how);
+        }
+    }
+
     pub(super) fn check_limits(&mut self) -> Result<(), Stop> {
-        let left = self.settings.max_evaluations.saturating_sub(self.evaluations);
+        let left = self.evaluations_left();
         let reason = match self.limit_reached() {
             Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
             _ if left == 0 => Some(StopReason::MaxEvaluations),

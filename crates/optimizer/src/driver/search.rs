@@ -220,7 +220,7 @@ impl<'a> Search<'a> {
     pub(super) fn tighten_tolerance(&mut self, run: &mut Run<'_>) {
         self.tightenings += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
-        run.observer.note(&format!(
+        run.note_going_on(&format!(
             "the method ended within its first steps: the search goes on with a relative tolerance of {:.0e}",
             self.ftol_rel
         ));
@@ -231,8 +231,9 @@ impl<'a> Search<'a> {
         self.is_restoring = true;
         (self.ftol_rel, self.tightenings) = (self.settings.ftol_rel, 0);
         self.move_trust_region(run);
-        run.observer
-            .note("no design yet keeps all constraints: the search goes on for one with the least violation");
+        run.note_going_on(
+            "no design yet keeps all constraints: the search goes on for one with the least violation",
+        );
     }
 
     /// Centres the trust region on the best design.
@@ -244,7 +245,7 @@ impl<'a> Search<'a> {
     pub(super) fn shrink_trust_region(&mut self, run: &mut Run<'_>, refused: &Refusal, gained: bool) {
         self.shrinks = if gained { 1 } else { self.shrinks + 1 };
         self.trust = TrustRegion::new(run.centre(), SHRINK * self.trust.scale);
-        run.observer.note(&format!(
+        run.note_going_on(&format!(
             "{}; the search goes on within {:.2} % of the bound range around the best design",
             refused.cause,
             100.0 * self.trust.scale

@@ -13,6 +13,6 @@ pub use wall_thickness::{Wall, WallThickness};
 #[derive(Debug, thiserror::Error)]
 #[error(
     "the thickness along the design's direction is not defined: there is no body behind the design surface, or some \
-     line through it meets no opposite face; leave the thickness limit out, or name the body's region"
+     line through it meets no opposite face; leave the thickness limit out, or give the body an entry in the regions"
 )]
 pub struct NoThickness;

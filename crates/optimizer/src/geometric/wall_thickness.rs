@@ -1,4 +1,4 @@
-//! Wall thickness of the designed body behind every design node, measured along the node's direction of motion.
+//! Wall thickness of the designed bodies behind every design node, measured along the node's direction of motion.
 //!
 //! From each node `x` of the design surface a ray runs against its direction `d` to the body's opposite face. On the
 //! undeformed mesh it meets a triangle with corners `y_k` and normal `n`, at the weights `b_k`. On a moved mesh the thickness
@@ -7,6 +7,8 @@
 //! `t = n·(x − y_0) / (n·d)`, `∂t/∂x = n / (n·d)`, `∂t/∂y_k = −b_k n / (n·d)`:
 //!
 //! the initial one plus the node's height where that face is held. A node without direction has no thickness.
+
+use std::collections::HashSet;
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
@@ -47,17 +49,12 @@ pub struct WallThickness {
 }
 
 impl WallThickness {
-    /// Measures the body `region` of the undeformed mesh; `None` where some ray does not meet an opposite face.
-    pub fn measure(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Option<Self> {
-        let topology = mesh.topology();
-        let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
-        let (designed, others): (Vec<[NodeId; 3]>, Vec<[NodeId; 3]>) = topology
-            .facets()
-            .iter()
-            .filter(|f| (region_at(f.inside) == region) != f.outside.is_some_and(|e| region_at(e) == region))
-            .map(|f| f.nodes)
-            .partition(|nodes| nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()));
-        let (others, designed) = (Faces::new(mesh, others), Faces::new(mesh, designed));
+    /// Measures the bodies of the undeformed mesh, each behind its own part of the design surface; `None` where some ray does not meet
+    /// an opposite face of its body.
+    pub fn measure(mesh: &Mesh, bodies: &[RegionId], surface: &DesignSurface) -> Option<Self> {
+        let bodies: Vec<BodyFaces> =
+            bodies.iter().map(|region| BodyFaces::new(mesh, *region, surface)).collect();
+        let first = bodies.first()?;
         let opposite = surface
             .nodes()
             .iter()
@@ -67,8 +64,9 @@ impl WallThickness {
                     return Some(None);
                 }
                 let (origin, back) = (mesh.point(node), direction.map(|d| -d));
+                let body = bodies.iter().find(|body| body.designed_nodes.contains(&node)).unwrap_or(first);
                 // Of a body with two designed faces, the other one.
-                others.nearest(origin, back).or_else(|| designed.nearest(origin, back)).map(Some)
+                body.others.nearest(origin, back).or_else(|| body.designed.nearest(origin, back)).map(Some)
             })
             .collect::<Option<Vec<_>>>()?;
         opposite.iter().any(Option::is_some).then_some(())?;
@@ -141,6 +139,28 @@ fn wall((node, direction): (NodeId, Point), opposite: [NodeId; 3], place: &impl 
     Wall { thickness, derivatives: derivatives.map(|(n, weight)| (n, derivative(weight))) }
 }
 
+/// The faces of a body that are part of the design surface, and its others.
+struct BodyFaces {
+    designed: Faces,
+    others: Faces,
+    designed_nodes: HashSet<NodeId>,
+}
+
+impl BodyFaces {
+    fn new(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Self {
+        let topology = mesh.topology();
+        let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
+        let (designed, others): (Vec<[NodeId; 3]>, Vec<[NodeId; 3]>) = topology
+            .facets()
+            .iter()
+            .filter(|f| (region_at(f.inside) == region) != f.outside.is_some_and(|e| region_at(e) == region))
+            .map(|f| f.nodes)
+            .partition(|nodes| nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()));
+        let designed_nodes = designed.iter().flatten().copied().collect();
+        Self { designed: Faces::new(mesh, designed), others: Faces::new(mesh, others), designed_nodes }
+    }
+}
+
 /// Faces of a body, found by rays.
 struct Faces {
     nodes: Vec<[NodeId; 3]>,
@@ -209,7 +229,7 @@ fn barycentric(triangle: &[Point; 3], point: Point) -> Point {
 mod tests {
     use super::*;
     use crate::design::{DesignSetup, Direction};
-    use fluxmorph_geometry::generate::{ShieldParameters, shield};
+    use fluxmorph_geometry::generate::{BoxRegion, BoxesParameters, ShieldParameters, boxes, shield};
 
     #[test]
     fn the_plate_is_ten_millimetres_thick_at_every_node() {
@@ -220,7 +240,7 @@ mod tests {
             DesignSurface::new(&mesh, &DesignSetup::new(triangles, Direction::Along([0.0, 0.0, -1.0])))
                 .expect("every node is a variable");
         let plate = mesh.topology().region("plate").expect("the shield has it");
-        let thickness = WallThickness::measure(&mesh, plate, &surface).expect("a plate has two faces");
+        let thickness = WallThickness::measure(&mesh, &[plate], &surface).expect("a plate has two faces");
         assert!(thickness.at_nodes().all(|(_, t)| (t - 0.010).abs() < 1e-12));
         let held = |n: NodeId| {
             let [x, y, z] = mesh.point(n);
@@ -229,6 +249,47 @@ mod tests {
         };
         let thick: Vec<f64> = thickness.walls(&surface, held).map(|(_, wall)| wall.thickness).collect();
         assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
+    }
+
+    /// Two plates one behind the other, each with its lower face in the design: what lies behind one is its own upper face.
+    #[test]
+    fn every_body_has_its_own_thickness() {
+        let plate = |name: &str, from: f64, to: f64| BoxRegion {
+            name: name.to_owned(),
+            corners: [[0.0, 0.0, from], [1.0, 1.0, to]],
+            size: [0.5; 3],
+            skin: [f64::INFINITY; 3],
+            cells: None,
+        };
+        let mesh = boxes(&BoxesParameters {
+            corners: [[0.0, 0.0, -0.5], [1.0, 1.0, 1.7]],
+            regions: vec![plate("thin", 0.0, 0.1), plate("thick", 1.0, 1.2)],
+            sizes: vec![],
+            surfaces: vec![],
+            growth: 2.0,
+            refinement: 1.0,
+            division: None,
+        })
+        .expect("two plates");
+        let topology = mesh.topology();
+        let [thin, thick] = ["thin", "thick"].map(|name| topology.region(name).expect("it has both"));
+        let at = |z: f64| {
+            let faces = topology.facets().iter().map(|facet| facet.nodes);
+            faces
+                .filter(|face| face.iter().all(|n| (mesh.point(*n)[2] - z).abs() < 1e-12))
+                .collect::<Vec<_>>()
+        };
+        let lower = [at(0.0), at(1.0)].concat();
+        let surface =
+            DesignSurface::new(&mesh, &DesignSetup::new(&lower, Direction::Along([0.0, 0.0, -1.0])))
+                .expect("every node is a variable");
+        let thickness = WallThickness::measure(&mesh, &[thin, thick], &surface).expect("both have two faces");
+        for (i, t) in thickness.at_nodes() {
+            let expected = if mesh.point(surface.nodes()[i])[2] < 0.5 { 0.1 } else { 0.2 };
+            assert!((t - expected).abs() < 1e-12, "{t} {expected}");
+        }
+        assert_eq!(thickness.at_nodes().count(), surface.nodes().len());
+        assert!(WallThickness::measure(&mesh, &[], &surface).is_none());
     }
 
     #[test]

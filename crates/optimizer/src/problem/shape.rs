@@ -81,7 +81,7 @@ impl Shape {
         &self.motion
     }
 
-    /// Thickness of the designed body, where it has one.
+    /// Thickness of the designed bodies, where they have one.
     pub fn thickness(&self) -> Option<&WallThickness> {
         self.thickness.as_ref()
     }

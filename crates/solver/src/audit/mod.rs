@@ -63,8 +63,8 @@ impl SkinAudit {
         if self.coarse_share > TOLERATED_SHARE {
             return Some(format!(
                 "region `{}`: the first element layer is too thick for the skin depth ({delta:.3} mm) on {:.0} % of the \
-                 surface (median {:.2} elements per skin depth): the field behind it will be wrong, and the error \
-                 estimate is too small. Refine the skin, or {instead}",
+                 surface (median {:.2} elements per skin depth): the field behind it will be wrong, and any error \
+                 estimate too small. Refine the skin, or {instead}",
                 self.region,
                 self.coarse_share * 100.0,
                 self.median_elements_per_skin_depth,
