@@ -120,6 +120,12 @@ fn what_is_another_mesh_or_configuration_than_that_of_the_run_is_not_shown_as_it
     );
     std::fs::write(folder.join("device.msh"), own).expect("written");
 
+    // An analysis on halved edges is of the same file.
+    let refined = folder.join("refined");
+    let config = folder.join("block.toml");
+    fluxmorph(&[&"solve", &config, &"--refine", &"1", &"--out", &refined, &"--quiet"]).exits_with(0);
+    assert!(!report(&refined).contains("another than that of the run"));
+
     // With another title a run may be resumed, with another bound it is another one.
     let (path, text) = (out.join("config.toml"), read_text(&out.join("config.toml")));
     std::fs::write(&path, format!("# a remark\n{text}")).expect("written");

@@ -3,17 +3,25 @@
 //! "At once" is a claim about the order of things, whatever else the machine does: the answer comes before the current
 //! evaluation ends, the end before it has a result. The times themselves are measured by `page`, in long series.
 
+use std::cell::Cell;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
-use crate::support::device::{Device, block, endless, shipped, slow};
+use fluxmorph::Error;
+use fluxmorph::files::system_disk;
+use fluxmorph::run::{self, Options, RunLimits, SavedRun};
+use fluxmorph::show::{Observer, RunObserver, Silent};
+use fluxmorph_optimizer::Error as OptimizerError;
+
+use crate::support::device::{BLOCK, Device, block, endless, shipped, slow};
 use crate::support::essence::{assert_same, essence};
 use crate::support::folder::{RunFolder, count, files, rows};
 use crate::support::program::{JOURNAL, PATIENCE, command, end_of, finish, folder, resume, send, wait_until};
 use crate::support::whole::{Logs, torn};
+use crate::support::{changed, options, parsed};
 
 /// What every command writes once it listens to signals.
 const LISTENS: &str = "setting up mesh and matrices";
@@ -278,4 +286,55 @@ fn a_run_that_is_out_of_time_goes_on() {
     assert_eq!((rows(&out), &RunFolder(out.clone()).result()["stop_reason"]), (1, &"max_time".into()));
     finish(resume(&out).args(["--max-time", "1 h"])).completed();
     assert_same(&essence(&files(&out)), &expected, "out of time");
+}
+
+/// Gives a signal as an estimate of the error begins.
+struct AtEstimate<'a> {
+    before: usize,
+    signal: &'a Cell<bool>,
+}
+
+impl Observer for AtEstimate<'_> {
+    fn phase(&mut self, name: &str) {
+        if name == "estimating the error of the mesh" {
+            self.signal.set(self.before == 0);
+            self.before = self.before.saturating_sub(1);
+        }
+    }
+}
+
+impl RunObserver for AtEstimate<'_> {}
+
+/// A signal within the estimate that a refinement follows from: that refinement is not begun, and the run that is resumed makes it.
+#[test]
+fn a_signal_while_the_mesh_is_refined_begins_no_further_refinement() {
+    let edges = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
+    let tolerance = ("[output]", "[accuracy]\ntolerance = \"2 %\"\n\n[output]");
+    let home = folder();
+    let (mut config, source) = parsed(&changed(BLOCK, &[edges, tolerance]));
+    let disk = system_disk();
+    let refinements = |out: &Path| match std::fs::read_to_string(out.join("refinements.json")) {
+        Ok(text) => text.matches("\"blake3\"").count(),
+        Err(_) => 0,
+    };
+    config.output.directory = home.path().join("whole");
+    let whole = run::run(&config, &source, options(&disk), &mut Silent).expect("it ends");
+    let all = refinements(&config.output.directory);
+    assert!(all > 1, "{all} refinements");
+    for before in [0, all - 1] {
+        let out = home.path().join(before.to_string());
+        config.output.directory = out.clone();
+        let signal = Cell::new(false);
+        let interrupted = || signal.get();
+        let asking = Options { interrupted: &interrupted, ..options(&disk) };
+        let mut observer = AtEstimate { before, signal: &signal };
+        let cut = run::run(&config, &source, asking, &mut observer);
+        assert!(matches!(cut, Err(Error::Optimizer(OptimizerError::InterruptedRun))), "{before}");
+        assert_eq!(refinements(&out), before);
+        let saved = SavedRun::open(&disk, &out).expect("a run");
+        let resumed =
+            run::resume(&saved, RunLimits::default(), options(&disk), &mut Silent).expect("it ends");
+        assert_eq!(refinements(&out), all);
+        assert_eq!(resumed.objective, whole.objective);
+    }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::folder::{RunFolder, list, number, read_text};
+use crate::support::folder::{RunFolder, list, number, read_json, read_text};
 use crate::support::program::{command, finish, folder};
 use crate::support::repository;
 use crate::support::shield::quick;
@@ -489,9 +489,9 @@ fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
 
 #[test]
 fn degrees_without_their_unit_are_asked_about() {
-    let said = "phase of 14.3 turns: a number without a unit is in radians";
+    let said = "coils[0].phase is 14.3 turns: if degrees are meant";
     assert!(check(&["coils[0].phase=90"]).contains(said));
-    assert!(!check(&["coils[0].phase=90 deg"]).contains("radians"));
+    assert!(!check(&["coils[0].phase=90 deg"]).contains("turns"));
 }
 
 /// The wall beside the coil is a wall, although an element that the coil meets reaches it.
@@ -508,11 +508,18 @@ fn a_near_wall_is_named_with_the_error_that_no_bar_has() {
     assert_eq!(near.0, "x_max");
     assert!(near.1 < 0.05 && far.1 > 0.3);
     let home = folder();
-    let said = |out: &str, overrides: &[&str]| {
-        let out = home.path().join(out);
-        finish(command(&[&"solve", &quick(), &"--out", &out]).args(set(overrides))).exits_with(0).stderr
+    let near_wall = |name: &str, overrides: &[&str]| {
+        let out = home.path().join(name);
+        finish(command(&[&"solve", &quick(), &"--out", &out]).args(set(overrides))).exits_with(0);
+        read_json(&out.join("result.json"))["accuracy"]["near_wall"].clone()
     };
-    let text = "of their half diagonal: no error bar counts what it cuts off";
-    let near = ["coils[0].half_window=[\"480 mm\", \"60 mm\"]"];
-    assert!(said("near", &near).contains(text) && !said("far", &[]).contains(text));
+    let estimated = "accuracy.estimate=true";
+    let text = near_wall("walls", &[estimated]);
+    assert!(
+        text.as_str().is_some_and(|text| text.contains("no error bar counts what it cuts off")),
+        "{text}"
+    );
+    let conditions = "boundaries.flux_parallel=[\"x_min\", \"y_min\"]";
+    let open = "open.surfaces=[\"x_max\", \"y_max\", \"z_min\", \"z_max\"]";
+    assert_eq!(near_wall("open", &[estimated, conditions, open]), Value::Null);
 }

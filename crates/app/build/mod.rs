@@ -12,6 +12,7 @@ mod elastic_body;
 mod elements;
 mod entries;
 mod field;
+mod forces;
 mod functional;
 mod loads;
 pub(crate) mod locate_error;
@@ -36,7 +37,7 @@ mod truncation;
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
 pub(crate) use elastic_body::{motion_in_words, stiffness_policy};
-pub(crate) use entries::material;
+pub(crate) use entries::{is_air, material};
 pub(crate) use field::{remaining_elements, remaining_nodes};
 pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};
@@ -45,7 +46,7 @@ pub use outline::{Outline, OutlinedDesign, outline};
 pub(crate) use references::functionals;
 pub(crate) use refined::RefinedMesh;
 pub use skin::Audited;
-pub(crate) use skin::result_warnings;
+pub(crate) use skin::{least_thickness, result_warnings};
 pub(crate) use truncation::Truncation;
 
 use std::collections::BTreeMap;
@@ -80,8 +81,6 @@ pub struct Setup {
     pub full_mesh: Mesh,
     /// Outer faces of it without a condition.
     pub open_patches: Vec<OpenPatch>,
-    /// The region that a positive design thickens.
-    pub designed_body: Option<String>,
     /// The B–H tables that were read from files, with BLAKE3 of their content.
     pub tables: BTreeMap<PathBuf, String>,
 }
@@ -133,8 +132,7 @@ pub fn set_up_watched(
     if !(mode == Mode::Inspection && config.morph.is_some()) {
         multipole::check_all(config, source, &setup.problem)?;
     }
-    let at_bounds =
-        skin::bound_warnings(config, &setup.audits, &setup.problem, setup.designed_body.as_deref());
+    let at_bounds = skin::bound_warnings(config, &setup.audits, (&setup.problem, &setup.full_mesh));
     setup.warnings.extend(at_bounds);
     Ok(setup)
 }
@@ -219,7 +217,6 @@ fn problem_on(
         warnings.push(unexcited(config, source, mode)?);
     }
     let objective = functional::objective(config, [&full_mesh, &mesh], &states)?;
-    let designed_body = body.as_ref().and_then(|body| body.thickened_region(config, &full_mesh));
     let shape = match (&design, body) {
         (Some(inputs), Some(body)) => {
             progress.stage(Stage::Elasticity);
@@ -244,7 +241,7 @@ fn problem_on(
     let problem =
         Problem::new(mesh, states, objective, constraints, shape).shared_out(share).with_bodies(bodies);
     let tables = curves.into_files();
-    Ok(Setup { problem, audits, warnings, full_mesh, open_patches, designed_body, tables })
+    Ok(Setup { problem, audits, warnings, full_mesh, open_patches, tables })
 }
 
 /// Refuses a mesh that is broken, or lacks what the configuration names, with warnings of what is rarely meant; outer faces

@@ -7,18 +7,16 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use fluxmorph_geometry::soundness::OpenPatch;
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub, volume};
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub, volume};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 use rayon::prelude::*;
 
 use super::entries::material;
-use super::references::functionals;
 use super::soundness::faces_of;
 use crate::config::{
-    Coil, CoilPath, CoilShape, ConductorWord, Config, Diagnostic, ForceBody, MeshConfig, ObjectiveKind,
-    RegionModel, SourceMap,
+    Coil, CoilPath, CoilShape, ConductorWord, Config, Diagnostic, MeshConfig, RegionModel, SourceMap,
 };
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
@@ -179,8 +177,7 @@ pub(super) fn warnings(
     warnings.extend(
         windings(coils).filter_map(|(i, winding)| thin_warning(config, mesh, &config.coils[i], winding)),
     );
-    warnings.extend(config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body)));
-    warnings.extend(cut_force_warnings(config, mesh));
+    warnings.extend(super::forces::warnings(config, mesh, coils));
     warnings.extend(phase_warnings(config));
     warnings.extend(unit_hint(config, mesh));
     warnings
@@ -234,7 +231,7 @@ fn common_place(first: &Racetrack, second: &Racetrack) -> Option<Point> {
 }
 
 /// The analytic windings, by the numbers of their coils.
-fn windings(coils: &[coil::Coil]) -> impl Iterator<Item = (usize, &Racetrack)> {
+pub(super) fn windings(coils: &[coil::Coil]) -> impl Iterator<Item = (usize, &Racetrack)> {
     coils.iter().enumerate().filter_map(|(i, coil)| match &coil.shape {
         coil::CoilShape::Racetrack(winding) => Some((i, winding)),
         _ => None,
@@ -247,7 +244,7 @@ fn flows(winding: &Racetrack, x: &Point) -> bool {
 }
 
 /// Where the current of a winding flows in elements that are asked for.
-fn place_of_current(
+pub(super) fn place_of_current(
     mesh: &Mesh,
     winding: &Racetrack,
     is_wanted: impl Fn(ElementId) -> bool,
@@ -320,99 +317,16 @@ pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
     area.map(|component| component / norm(area))
 }
 
-/// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
-fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &ForceBody) -> Option<String> {
-    let topology = mesh.topology();
-    let is_iron = |name: &str| material(config, name).relative_permeability != 1.0;
-    let acts = |name: &String| {
-        let is_magnet = config.regions.get(name).is_some_and(|region| region.remanence.is_some());
-        let is_wound = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == *name);
-        let conducts = config.alternates() && material(config, name).conductivity > 0.0;
-        is_iron(name) || is_magnet || conducts || config.coils.iter().any(is_wound)
-    };
-    let (name, regions) = (&body.name, body.regions.join("`, `"));
-    let is_own = |e: ElementId| body.regions.iter().any(|name| name == topology.region_name_at(e));
-    let holds_a_coil =
-        || windings(coils).any(|(_, winding)| place_of_current(mesh, winding, is_own).is_some());
-    if !body.regions.iter().any(acts) && !holds_a_coil() {
-        return Some(format!(
-            "no force acts on the body `{name}`: nothing in `{regions}` is magnetic or carries a current, and what is computed is \
-             that on what lies beside it"
-        ));
-    }
-    let region = |name: &&String| topology.region(name).ok().filter(|_| is_iron(name));
-    let own: Vec<RegionId> = body.regions.iter().filter_map(|name| region(&name)).collect();
-    let touches = |other: RegionId| own.iter().any(|&own| !topology.interface(own, other).is_empty());
-    let mut outside = topology.region_names().iter().filter(|name| !body.regions.contains(name));
-    let joined = outside.find(|name| region(name).is_some_and(touches))?;
-    Some(format!(
-        "the body `{name}` is joined to the iron of `{joined}`: where iron meets iron the force on one side depends on the mesh; \
-         take `{joined}` into its regions, or leave air between the two"
-    ))
-}
-
-/// What to say of forces and torques that are sought across a plane which cuts their body: of these only a part is computed.
-fn cut_force_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
-    let topology = mesh.topology();
-    let mut warnings = Vec::new();
-    for (path, own) in functionals(config) {
-        let Some(body) = config.forces.iter().find(|body| Some(&body.name) == own.region.as_ref()) else {
-            continue;
-        };
-        let direction = own.direction.unwrap_or_default();
-        // Of the virtual motion of the body.
-        let velocity = |x: Point| match own.kind {
-            ObjectiveKind::Force => direction,
-            ObjectiveKind::Torque => cross(direction, sub(x, body.about)),
-            _ => [0.0; 3],
-        };
-        let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
-        let outside: Vec<[NodeId; 3]> = regions.flat_map(|region| topology.outer_faces(region)).collect();
-        // Outer faces hold the nodes of the body (`Force`), with a condition or without.
-        let goes_across = |face: &[NodeId; 3]| {
-            let corners = face.map(|node| mesh.point(node));
-            let (area, v) = (area_vector(corners), velocity(centroid(corners)));
-            dot(v, area).abs() > INCLINED * norm(v) * norm(area)
-        };
-        let cut = config.boundaries.surfaces().find(|surface| {
-            let faces = faces_of(topology, [surface.as_str()]);
-            outside.iter().any(|face| faces.contains(&face_key(*face)) && goes_across(face))
-        });
-        let natural = || {
-            let named = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
-            let face = outside.iter().find(|face| !named.contains(&face_key(**face)) && goes_across(face))?;
-            let place = millimetres(centroid(face.map(|node| mesh.point(node))));
-            Some(format!("the outer face at {place}, which has no condition,"))
-        };
-        let cut = cut.map(|surface| format!("the surface `{surface}`")).or_else(natural);
-        if let Some(surface) = cut {
-            let is_magnet =
-                |name: &String| config.regions.get(name).is_some_and(|own| own.remanence.is_some());
-            let of_magnet = if body.regions.iter().any(is_magnet) {
-                "; of a magnet it comes from the singular field beside the cut, and its error bar is far too small"
-            } else {
-                ""
-            };
-            warnings.push(format!(
-                "{path}: {surface} cuts the body `{}`, and what is computed across it is that on the free faces of \
-                 the meshed part, without the stress in the cut; on half of a symmetric body that is not a force on anything{of_magnet}. \
-                 Take a direction along the surface, or mesh the whole body",
-                body.name
-            ));
-        }
-    }
-    warnings
-}
-
 /// What to say of phases of more than a turn: degrees without their unit.
 fn phase_warnings(config: &Config) -> Vec<String> {
-    let own = config.coils.iter().map(|coil| ("coils", &coil.name, coil.phase));
-    let of_loads =
-        config.loads.iter().flat_map(|load| load.phase.values().map(|phase| ("loads", &load.name, *phase)));
-    let turned = own.chain(of_loads).filter(|(.., phase)| phase.abs() > TAU);
-    let text = |(table, name, phase): (&str, &String, f64)| {
+    let own = config.coils.iter().enumerate().map(|(i, coil)| (format!("coils[{i}].phase"), coil.phase));
+    let of_loads = config.loads.iter().enumerate().flat_map(|(i, load)| {
+        load.phase.iter().map(move |(coil, phase)| (format!("loads[{i}].phase.{coil}"), *phase))
+    });
+    let turned = own.chain(of_loads).filter(|(_, phase)| phase.abs() > TAU);
+    let text = |(path, phase): (String, f64)| {
         format!(
-            "`{name}` in [[{table}]] has a phase of {:.1} turns: a number without a unit is in radians, degrees are \"90 deg\"",
+            "{path} is {:.1} turns: if degrees are meant, they are written \"90 deg\"; a number without a unit is in radians",
             phase / TAU
         )
     };

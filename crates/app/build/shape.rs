@@ -3,17 +3,17 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::parallel::Ownership;
-use fluxmorph_geometry::tet4::{Point, add, centroid, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, add, centroid, dot, norm};
 use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, millimetres};
 use fluxmorph_optimizer::design::DesignSurface;
-use fluxmorph_optimizer::geometric::WallThickness;
+use fluxmorph_optimizer::geometric::{WallThickness, faces_with_bodies};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup, Subregion};
 use fluxmorph_solver::FieldModel;
 
 use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
-use super::entries::material;
+use super::entries::{is_air, material};
 use super::outline::same_nodes;
 use super::plausible;
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
@@ -51,12 +51,6 @@ impl Body {
     pub(super) fn moving(&self) -> &[ElementId] {
         self.motion.moving()
     }
-
-    /// The name of the region that a positive design thickens, where it is one.
-    pub(super) fn thickened_region(&self, config: &Config, full_mesh: &Mesh) -> Option<String> {
-        let [region] = thickened_regions(full_mesh, &self.full_surface, config)[..] else { return None };
-        Some(full_mesh.topology().region_names()[region.index()].clone())
-    }
 }
 
 /// Makes the design surface and the elastic map.
@@ -78,7 +72,8 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         ));
     }
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
-    warnings.extend(held_warning(inputs.remesh, design, mesh, &surface));
+    warnings.extend(held_warning(inputs.remesh, mesh, &surface));
+    warnings.extend(slid_warning(inputs.remesh, design));
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
     warnings.extend(unused_keys(source, inputs.remesh, law));
@@ -129,8 +124,8 @@ fn side_warning(config: &Config, design: &Design, mesh: &Mesh, nodes: &[NodeId])
     })
 }
 
-/// Nodes of the design on surfaces that are said to stay, and design surfaces that are said to slide.
-fn held_warning(remesh: &Remesh, design: &Design, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
+/// Nodes of the design on surfaces that are said to stay.
+fn held_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
     let moves = |node: &NodeId| {
         let row = surface.nodes().binary_search(node).ok();
         row.is_some_and(|row| surface.directions()[row] != [0.0; 3] && !surface.rows()[row].is_empty())
@@ -146,11 +141,18 @@ fn held_warning(remesh: &Remesh, design: &Design, mesh: &Mesh, surface: &DesignS
             )
         })
     };
-    let sliding = remesh.slide.iter().filter(|name| design.surface.contains(name));
-    let sliding = sliding.map(|name| {
-        format!("`{name}` in remesh.slide is a design surface: its nodes move as the design says, and do not slide")
-    });
-    remesh.fixed.iter().filter_map(of).chain(sliding).collect()
+    remesh.fixed.iter().filter_map(of).collect()
+}
+
+/// Design surfaces that are said to slide.
+fn slid_warning(remesh: &Remesh, design: &Design) -> Vec<String> {
+    let designed = remesh.slide.iter().filter(|name| design.surface.contains(name));
+    let text = |name: &String| {
+        format!(
+            "`{name}` in remesh.slide is a design surface: its nodes move as the design says, and do not slide"
+        )
+    };
+    designed.map(text).collect()
 }
 
 /// Faces in `remesh.free` whose other side is no part of the elastic body.
@@ -226,25 +228,13 @@ pub(super) fn shape(
 /// The regions that a positive design thickens, ascending: behind the design surface, and not air.
 pub(super) fn thickened_regions(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Vec<RegionId> {
     let topology = mesh.topology();
-    let direction_at = |node: &NodeId| {
-        let row = surface.nodes().binary_search(node).ok()?;
-        Some(surface.directions()[row]).filter(|direction| *direction != [0.0; 3])
+    let is_body = |region: &RegionId| {
+        let name = &topology.region_names()[region.index()];
+        config.regions.contains_key(name) && !is_air(config, name)
     };
-    let region_behind = |facet: &Facet| {
-        let direction = facet.nodes.iter().find_map(direction_at)?;
-        let behind = |e: &ElementId| {
-            let offset = sub(centroid(mesh.vertices(*e)), centroid(facet.nodes.map(|n| mesh.point(n))));
-            dot(offset, direction) < 0.0
-        };
-        let element = std::iter::once(facet.inside).chain(facet.outside).find(behind)?;
-        Some(topology.region_of()[element.index()])
-    };
-    let is_designed =
-        |f: &&Facet| f.outside.is_some() && f.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok());
-    let behind: BTreeSet<RegionId> =
-        topology.facets().iter().filter(is_designed).filter_map(region_behind).collect();
-    let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
-    behind.into_iter().filter(has_entry).collect()
+    let behind = faces_with_bodies(mesh, surface);
+    let behind = behind.into_iter().map(|(_, element)| topology.region_of()[element.index()]);
+    behind.filter(is_body).collect::<BTreeSet<_>>().into_iter().collect()
 }
 
 /// Refuses bounds at which nothing is left of the body: all variables there, somewhere, take more than its thickness.

@@ -1,5 +1,7 @@
 //! Skin-depth audits of the conductors: of the mesh as it is, of the thinnest design allowed, and of a design that was found.
 
+use std::collections::BTreeMap;
+
 use fluxmorph_geometry::tet4::{Point, add};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_optimizer::problem::{Problem, Shape};
@@ -71,18 +73,17 @@ fn alike(config: &Config, mesh: &Mesh, region: &config::Region) -> Vec<RegionId>
 pub(super) fn bound_warnings(
     config: &Config,
     audits: &[Audited],
-    problem: &Problem,
-    body: Option<&str>,
+    (problem, full_mesh): (&Problem, &Mesh),
 ) -> Vec<String> {
     let Some(shape) = problem.shape() else { return Vec::new() };
     let bounds = [("design.lower", shape.lower()), ("design.upper", shape.upper())];
-    let left = bounds.map(|(_, p)| thinnest(config, problem.original(), shape, p));
-    // The bound at which least is left of the body; without a thickness the lower one.
-    let (key, p) = if left[1] < left[0] { bounds[1] } else { bounds[0] };
-    let thinnest = left.into_iter().flatten().reduce(f64::min);
+    let left = bounds.map(|(_, p)| thinnest(config, (problem.original(), full_mesh), shape, p));
+    // The bound at which least is left of a body; without a thickness the lower one.
+    let least = left.each_ref().map(|bodies| bodies.values().copied().fold(f64::INFINITY, f64::min));
+    let at = usize::from(least[1] < least[0]);
+    let (key, p) = bounds[at];
     let sound = audits.iter().filter(|audited| audited.warning().is_none());
-    let walls = sound.filter(|own| Some(own.audit.region.as_str()) == body);
-    let thin = walls.filter_map(|own| wall_warning(own, thinnest?));
+    let thin = sound.filter_map(|own| wall_warning(own, &left[at]));
     let mut warnings: Vec<String> = thin
         .map(|text| {
             format!(
@@ -103,14 +104,10 @@ pub(crate) fn result_warnings(
     config: &Config,
     audits: &[Audited],
     mesh: &Mesh,
-    thinnest: Option<(&str, f64)>,
+    thinnest: &LeastThickness,
 ) -> Vec<String> {
-    let wall = |own: &Audited| {
-        let (_, thickness) = thinnest.filter(|(region, _)| *region == own.audit.region)?;
-        wall_warning(own, thickness)
-    };
     let sound = audits.iter().filter(|audited| audited.warning().is_none());
-    sound.filter_map(wall).chain(new_objections(config, audits, mesh)).collect()
+    sound.filter_map(|own| wall_warning(own, thinnest)).chain(new_objections(config, audits, mesh)).collect()
 }
 
 /// Objections to meshed conductors of a moved mesh to which there was none at the start.
@@ -129,14 +126,29 @@ fn new_objections<'a>(
     self::audits(config, mesh).into_iter().filter(is_new).filter_map(|now| now.warning())
 }
 
-/// What an impedance surface of a wall of this thickness [m] assumes in vain.
-fn wall_warning(audited: &Audited, thickness: f64) -> Option<String> {
+/// The least thickness [m] of every designed body, by the names of their regions.
+pub(crate) type LeastThickness = BTreeMap<String, f64>;
+
+/// What an impedance surface assumes in vain of the wall that it stands for.
+fn wall_warning(audited: &Audited, least: &LeastThickness) -> Option<String> {
+    let thickness = *least.get(&audited.audit.region)?;
     (audited.model == RegionModel::Impedance).then(|| audited.audit.wall_warning(thickness)).flatten()
 }
 
-/// The least thickness [m] of the designed body for the variables `p`, with its opposite face as it was, or the least that a
-/// constraint allows.
-fn thinnest(config: &Config, mesh: &Mesh, shape: &Shape, p: &[f64]) -> Option<f64> {
+/// The least thickness [m] of the designed bodies where every node is at `place` [m].
+pub(crate) fn least_thickness(
+    shape: &Shape,
+    full_mesh: &Mesh,
+    place: impl Fn(NodeId) -> Point,
+) -> LeastThickness {
+    let Some(thickness) = shape.thickness() else { return BTreeMap::new() };
+    let name = |region: RegionId| full_mesh.topology().region_names()[region.index()].clone();
+    let least = thickness.least_of_bodies(shape.surface(), place);
+    least.into_iter().map(|(region, least)| (name(region), least)).collect()
+}
+
+/// That for the variables `p`, with opposite faces as they were, or the least that a constraint allows.
+fn thinnest(config: &Config, (mesh, full_mesh): (&Mesh, &Mesh), shape: &Shape, p: &[f64]) -> LeastThickness {
     let surface = shape.surface();
     let displacement = shape.displacement(p);
     let place = |node: NodeId| -> Point {
@@ -145,11 +157,12 @@ fn thinnest(config: &Config, mesh: &Mesh, shape: &Shape, p: &[f64]) -> Option<f6
             Err(_) => mesh.point(node),
         }
     };
-    let walls = shape.thickness()?.walls(surface, place).map(|(_, wall)| wall.thickness);
-    let least = walls.fold(f64::INFINITY, f64::min);
+    let least = least_thickness(shape, full_mesh, place);
     let minimum = |constraint: &config::Constraint| match constraint.limit {
         Limit::Thickness { minimum, .. } => minimum,
         _ => None,
     };
-    Some(config.constraints.iter().filter_map(minimum).fold(least, f64::max))
+    let minima: Vec<f64> = config.constraints.iter().filter_map(minimum).collect();
+    let allowed = |least: f64| minima.iter().copied().fold(least, f64::max);
+    least.into_iter().map(|(name, least)| (name, allowed(least))).collect()
 }

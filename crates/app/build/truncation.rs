@@ -1,10 +1,10 @@
 //! How far the walls of the mesh are from what makes and bends the field: what they cut off is not computed. A flux-normal
-//! surface is taken for a symmetry plane, and so is one that coils or matter reach.
+//! surface is taken for a symmetry plane, and so is one that coils or matter reach; one of a uniform field is where that comes from.
 
 use std::collections::HashSet;
 
 use fluxmorph_geometry::box_tree::AxisBox;
-use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::tet4::{Point, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres};
 use fluxmorph_solver::coil::CoilShape;
@@ -13,8 +13,8 @@ use serde::Serialize;
 
 use super::Setup;
 
-/// Distance in half diagonals of what makes and bends the field below which a wall is near: at 1.6 a coil's field was 14 % off on
-/// its axis, at 3 its dipole's image is a hundredth.
+/// Distance in half diagonals of what makes and bends the field below which a wall is near: at 1.6 of a coil's its field was 14 %
+/// off on the axis, at 1.4 of the shield's its objective 11 % low (docs/howto/open_space.md).
 const NEAR: f64 = 2.0;
 
 /// The nearest wall that no coil, magnet, conductor or iron reaches.
@@ -24,7 +24,7 @@ pub(crate) struct Truncation {
     pub(crate) surface: String,
     /// From the box around coils and matter to it [m].
     pub(crate) distance_m: f64,
-    /// Half the diagonal of that box [m].
+    /// Half the diagonal of that box, with what planes of symmetry cut off [m].
     pub(crate) source_size_m: f64,
 }
 
@@ -45,9 +45,10 @@ impl Truncation {
         let outer: HashSet<_> =
             topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
         let distance = |name: &str| -> Option<f64> {
-            let is_symmetry =
-                |(own, boundary): &(String, Boundary)| own == name && *boundary == Boundary::FluxNormal;
-            if model.setup().boundaries.iter().any(is_symmetry) {
+            let is_no_wall = |(own, boundary): &(String, Boundary)| {
+                own == name && matches!(boundary, Boundary::FluxNormal | Boundary::UniformField(_))
+            };
+            if model.setup().boundaries.iter().any(is_no_wall) {
                 return None;
             }
             let triangles = topology.surface(name).ok()?;
@@ -59,18 +60,25 @@ impl Truncation {
         };
         let walls = topology.surface_names().filter_map(|name| Some((name, distance(name)?)));
         let (surface, distance_m) = walls.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let source_size_m = 0.5 * norm(sub(sources.upper, sources.lower));
+        // What a plane of symmetry cuts goes on behind it.
+        let [lower, upper] = mesh.bounding_box();
+        let whole = |d: usize| {
+            let own = sources.upper[d] - sources.lower[d];
+            let is_cut = (sources.lower[d] <= lower[d]) != (sources.upper[d] >= upper[d]);
+            if is_cut { 2.0 * own } else { own }
+        };
+        let source_size_m = 0.5 * norm([0, 1, 2].map(whole));
         Some(Self { surface: surface.to_owned(), distance_m, source_size_m })
     }
 
     /// What no error bar counts, where the wall is near.
-    pub(crate) fn warning(&self) -> Option<String> {
+    pub(crate) fn described(&self) -> Option<String> {
         let Self { surface, distance_m, source_size_m } = self;
-        let share = distance_m / source_size_m;
-        (share < NEAR).then(|| {
+        let ratio = distance_m / source_size_m;
+        (ratio < NEAR).then(|| {
             format!(
-                "the wall `{surface}` is {:.3} mm from coils and matter, {share:.1} of their half diagonal: no error bar counts what it \
-                 cuts off; [open] takes walls away, and one farther off shows how much that is",
+                "the wall `{surface}` is {:.3} mm from coils and matter, {ratio:.1} times their half diagonal: where it stands for open \
+                 space, no error bar counts what it cuts off; walls farther off, or [open], show how much that is",
                 Millimetres(*distance_m)
             )
         })

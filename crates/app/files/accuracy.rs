@@ -45,6 +45,9 @@ pub struct Accuracy {
     /// The curved surface whose facets are farthest off it; `None` where none is curved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub facets: Option<CurvedFacets>,
+    /// What a wall that is near may cut off, in words; `None` where none is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub near_wall: Option<String>,
     /// The same two shapes by other elements on the same mesh.
     pub cross_check: Option<CrossCheck>,
     /// Whether the gain of a run is the shape's.

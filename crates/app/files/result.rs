@@ -439,6 +439,7 @@ pub(crate) mod tests {
                 }],
             }),
             accuracy: Some(Accuracy {
+                near_wall: None,
                 error_estimate_relative: Some(0.004),
                 error_estimate: Some([0.01, 0.001]),
                 refinements: 0,

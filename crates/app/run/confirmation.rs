@@ -108,11 +108,11 @@ impl Session<'_> {
     ) -> Option<Accuracy> {
         let shape = self.cut_shape(objective, meshes);
         let is_said = errors.is_some() || objective.is_verified_on_cut_elements();
-        self.near_wall.iter().filter(|_| is_said).for_each(|near| observer.notice(near));
         let facets = is_said.then(|| self.facets_of(shape, observer)).flatten();
-        let mut accuracy = Accuracy { facets, ..Accuracy::default() };
+        let near_wall = is_said.then(|| self.near_wall_noted(observer)).flatten();
+        let mut accuracy = Accuracy { facets, near_wall, ..Accuracy::default() };
         if !self.has_field_objective() {
-            return accuracy.facets.is_some().then_some(accuracy);
+            return (accuracy.facets.is_some() || accuracy.near_wall.is_some()).then_some(accuracy);
         }
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);
@@ -228,6 +228,12 @@ impl Session<'_> {
         let facets = if off(&of_shape) > off(&self.facets) { of_shape } else { self.facets.clone() }?;
         observer.notice(&described(&facets));
         Some(facets)
+    }
+
+    /// What no estimate has of a near wall, which is reported.
+    pub(super) fn near_wall_noted(&self, observer: &mut dyn Observer) -> Option<String> {
+        self.near_wall.iter().for_each(|near| observer.notice(near));
+        self.near_wall.clone()
     }
 
     /// Whether the result of a run that has ended so is to be looked at again.

@@ -9,10 +9,9 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, Millimetres, NodeId, millimetres};
-use fluxmorph_solver::Material;
 
-use crate::build::{functionals, material};
-use crate::config::{self, Coil, CoilShape, Config, Region, RegionModel};
+use crate::build::{functionals, is_air};
+use crate::config::{Coil, CoilShape, Config};
 use crate::files::CurvedFacets;
 
 /// Cosine of the largest angle, 35°, at which two facets are taken for one curved surface: a ball with eight of them along a half
@@ -91,11 +90,7 @@ pub(super) fn curved_facets(mesh: &Mesh, empty: impl Fn(&str) -> bool) -> Option
 /// Whether a region is air in which nothing flows and nothing is measured.
 pub(super) fn is_empty(config: &Config, name: &str) -> bool {
     let is_wound = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == name);
-    let acts = |own: &Region| own.remanence.is_some() || own.model != RegionModel::Volume;
-    let written = config.regions.get(name).and_then(|region| config.materials.get(&region.material));
-    material(config, name) == Material::AIR
-        && !written.is_some_and(config::Material::saturates)
-        && !config.regions.get(name).is_some_and(acts)
+    is_air(config, name)
         && !config.coils.iter().any(is_wound)
         && !config.forces.iter().any(|body| body.regions.iter().any(|own| own == name))
         && !functionals(config).iter().any(|(_, own)| own.region.as_deref() == Some(name))

@@ -30,8 +30,8 @@ use crate::show::RunObserver;
 enum Refined {
     Yes,
     No,
-    /// There is nothing left to use it with: what ends the run, and a warning.
-    OutOf(StopReason, String),
+    /// There is nothing left to use it with: what ends the run, and a warning of the tolerance; a signal is none.
+    OutOf(StopReason, Option<String>),
 }
 
 /// Evaluations with which a search on a finer mesh begins: of the initial design, and of the best one before it.
@@ -175,8 +175,8 @@ impl Session<'_> {
             };
             let is_refined = matches!(refined, Refined::Yes);
             if let Refined::OutOf(reason, warning) = refined {
-                observer.warning(&warning);
-                optimised.warnings.push(warning);
+                warning.iter().for_each(|warning| observer.warning(warning));
+                optimised.warnings.extend(warning);
                 optimised.stop_reason = reason;
             }
             if !is_refined {
@@ -193,7 +193,7 @@ impl Session<'_> {
         }
     }
 
-    /// Ends a run that has no evaluation yet once a signal came.
+    /// Ends a run before its next evaluation once a signal came.
     fn check_interrupted(&self) -> Result<(), OptimizerError> {
         OptimizerError::check_interrupted(self.interrupted).map_err(|_| OptimizerError::InterruptedRun)
     }
@@ -232,14 +232,13 @@ impl Session<'_> {
                 observer.warning("without an estimated error the mesh is not refined to accuracy.tolerance");
                 return Ok(());
             };
-            self.check_interrupted()?;
             let scale = analysis.objective.map_or(f64::NAN, f64::abs);
             let of_initial = (&analysis, &estimate, scale);
             match self.refine(levels, (0, limit), of_initial, observer)? {
                 Refined::Yes => {}
                 Refined::No => return Ok(()),
                 Refined::OutOf(_, warning) => {
-                    observer.warning(&warning);
+                    warning.iter().for_each(|warning| observer.warning(warning));
                     return Ok(());
                 }
             }
@@ -263,8 +262,11 @@ impl Session<'_> {
                 | StopReason::Interrupted
                 | StopReason::NumericalFailure
         );
-        if is_over || (self.interrupted)() {
+        if is_over {
             return Ok((Refined::No, None));
+        }
+        if (self.interrupted)() {
+            return Ok((Refined::OutOf(StopReason::Interrupted, None), None));
         }
         if let Some(step) = levels.next_kept(optimised.evaluations) {
             self.refine_again(levels, &step)?;
@@ -274,9 +276,6 @@ impl Session<'_> {
         let Some(estimate) = self.estimator().estimate(analysis, observer) else {
             return Ok((Refined::No, None));
         };
-        if (self.interrupted)() {
-            return Ok((Refined::No, Some(estimate)));
-        }
         let scale = optimised.initial.abs().max(optimised.best.objective.abs());
         let of_best = (analysis, &estimate, scale);
         let refined = self.refine(levels, (optimised.evaluations, limit), of_best, observer)?;
@@ -310,7 +309,10 @@ impl Session<'_> {
             let left =
                 if reason == StopReason::MaxTime { "there is no time" } else { "too few evaluations are" };
             let warning = format!("{said}, and {left} left for a finer mesh: the tolerance is not kept");
-            return Ok(Refined::OutOf(reason, warning));
+            return Ok(Refined::OutOf(reason, Some(warning)));
+        }
+        if (self.interrupted)() {
+            return Ok(Refined::OutOf(StopReason::Interrupted, None));
         }
         observer.phase("refining the mesh");
         let full = levels.mesh.mesh().topology();

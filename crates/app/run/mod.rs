@@ -48,7 +48,6 @@ use crate::build::locate_error::attribute_error;
 use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
-use crate::exit_code::ExitCode;
 use crate::files::{
     CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements,
     RunDirectory, RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
@@ -289,14 +288,15 @@ impl Session<'_> {
         Ok(Concluded { result, directory: self.directory })
     }
 
-    /// Whether a run that ended with an error can be resumed, and would not end with it again: what failed before there was an
-    /// evaluation fails before it again.
+    /// Whether a run that ended with an error can be resumed, and there is something to go on from.
     fn is_worth_resuming(&self, error: &Error) -> bool {
         let has_evaluations =
             || Journal::read_records(&self.directory).is_ok_and(|records| !records.is_empty());
+        let has_refinements =
+            || Refinements::read(&self.directory).is_ok_and(|own| !own.refinements.is_empty());
         error.is_resumable()
             && self.directory.holds_configuration()
-            && (error.exit_code() != ExitCode::Numerical || has_evaluations())
+            && (has_evaluations() || has_refinements())
     }
 
     fn write_configuration(&self) -> Result<(), Error> {

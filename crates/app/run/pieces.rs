@@ -77,7 +77,7 @@ struct PieceWriter {
     share: Ownership,
     /// Of the topology that all designs have.
     mesh: Mesh,
-    /// Whether the fields come with the thickness of a designed body.
+    /// Whether the fields come with the thickness of designed bodies.
     has_thickness: bool,
     directory: PathBuf,
 }

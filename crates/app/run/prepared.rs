@@ -10,7 +10,7 @@ use super::{Options, Session, mesh_hash, table_hashes};
 use crate::build::{Mode, Setup, Truncation, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{CurvedFacets, LimitsInForce, Manifest, RunDirectory, surface_files};
+use crate::files::{CurvedFacets, LimitsInForce, Manifest, MeshHash, RunDirectory, surface_files};
 use crate::show::RunObserver;
 
 /// A problem that is set up, and what its set-up was given.
@@ -21,6 +21,8 @@ pub(super) struct Prepared<'a> {
     /// Of the mesh before it is refined.
     facets: Option<CurvedFacets>,
     near_wall: Option<String>,
+    /// Of the mesh of the configuration, before it is cut.
+    mesh: MeshHash,
     options: Options<'a>,
     clock: Instant,
 }
@@ -41,8 +43,9 @@ impl<'a> Prepared<'a> {
         memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
         let facets = curved_facets(&setup.full_mesh, |name| is_empty(config, name));
-        let near_wall = Truncation::of(&setup).and_then(|truncation| truncation.warning());
-        Ok(Self { setup, config, source, facets, near_wall, options, clock })
+        let near_wall = Truncation::of(&setup).and_then(|truncation| truncation.described());
+        let mesh = mesh_hash(config, &setup.full_mesh);
+        Ok(Self { setup, config, source, facets, near_wall, mesh, options, clock })
     }
 
     /// Takes the output directory, and writes the manifest.
@@ -51,11 +54,11 @@ impl<'a> Prepared<'a> {
         command: &'static str,
         observer: &mut dyn RunObserver,
     ) -> Result<Session<'a>, Error> {
-        let Self { config, source, options, .. } = self;
+        let Self { config, source, options, ref mesh, .. } = self;
         let directory =
             RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
         let mut manifest = Manifest::new(command, options.threads).reading(source);
-        manifest.mesh = Some(mesh_hash(config, &self.setup.full_mesh));
+        manifest.mesh = Some(mesh.clone());
         manifest.tables = table_hashes(&self.setup.tables);
         manifest.ranks = options.ranks.map(RankGroup::size);
         manifest.surfaces = surface_files(&config.output.stl);
@@ -73,7 +76,7 @@ impl<'a> Prepared<'a> {
         directory: RunDirectory,
         manifest: Manifest,
     ) -> Session<'a> {
-        let Self { setup, config, source, facets, near_wall, options, clock } = self;
+        let Self { setup, config, source, facets, near_wall, options, clock, .. } = self;
         let setup_seconds = clock.elapsed().as_secs_f64();
         Session {
             command,

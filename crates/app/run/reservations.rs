@@ -12,7 +12,7 @@ use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
-use crate::build::{Setup, material, result_warnings};
+use crate::build::{Setup, least_thickness, material, result_warnings};
 use crate::config::{Config, Goal, RegionModel};
 use crate::files::ObjectiveResult;
 
@@ -49,11 +49,10 @@ impl Saturated {
 pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<String> {
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
-    let least = problem.shape().and_then(|shape| {
-        let thickness = shape.thickness()?.range(shape.surface(), &analysis.mesh).0;
-        Some((setup.designed_body.as_deref()?, thickness))
-    });
-    all.extend(result_warnings(config, &setup.audits, &analysis.mesh, least));
+    let least = problem
+        .shape()
+        .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
+    all.extend(result_warnings(config, &setup.audits, &analysis.mesh, &least.unwrap_or_default()));
     all
 }
 

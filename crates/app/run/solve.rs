@@ -107,7 +107,6 @@ impl Session<'_> {
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
         let estimate = analysis.objective.zip(estimate).filter(|_| self.has_field_objective());
-        self.near_wall.iter().filter(|_| estimate.is_some()).for_each(|near| observer.notice(near));
         Ok(RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
@@ -123,6 +122,7 @@ impl Session<'_> {
             accuracy: estimate.map(|(value, estimate)| Accuracy {
                 refinements: halvings as usize,
                 facets: self.facets_of(None, observer),
+                near_wall: self.near_wall_noted(observer),
                 ..Accuracy::of_analysis(value, estimate.objective)
             }),
             constraints,

@@ -30,7 +30,7 @@ pub enum Quantity {
     Field(Box<Term>),
     /// A volume [m³] or mass [kg].
     Volume(Volume),
-    /// The least or greatest thickness [m] of the designed body, where the measure counts from `bound`.
+    /// The least or greatest thickness [m] of the designed bodies, where the measure counts from `bound`.
     Thickness {
         /// By how much the worst place is beyond the bound.
         measure: geometric::ThicknessBound,

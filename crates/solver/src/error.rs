@@ -241,8 +241,8 @@ pub enum PointsOf {
 pub enum NonConvergence {
     /// The residual stays, with the most robust method that there is memory for.
     #[error(
-        "the mesh may hold nearly flat elements, the material data span too many orders of magnitude, or a conductor be so weak that \
-         its skin depth is thousands of edge elements (nodal ones carry it); more memory for a factor may help"
+        "the mesh may hold nearly flat elements, the material data span too many orders of magnitude, or a conductor is so weak that \
+         edge elements do not carry it, and nodal ones do; more memory for a factor may help"
     )]
     IllConditioned,
     /// Something on the way is not finite.

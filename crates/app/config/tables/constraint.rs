@@ -55,7 +55,7 @@ table! {
 table! {
     /// The keys that say what is limited, for all kinds together.
     pub(in crate::config) struct LimitKeys {
-        /// What is limited: a quantity of the field, a volume or mass, or the thickness of the body.
+        /// What is limited: a quantity of the field, a volume or mass, or the thickness of the designed bodies.
         kind: Kind = WORD, need "\"volume\"";
         /// The region it is measured in. Required, but for `energy`, `thickness` and quantities of `coils`.
         region: Option<String> = TEXT;

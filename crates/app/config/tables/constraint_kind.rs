@@ -19,7 +19,7 @@ choice! {
 pub(in crate::config) enum Kind {
     /// As in `[objective]`.
     Functional(ObjectiveKind),
-    /// The thickness of the designed body.
+    /// The thickness of the designed bodies.
     Thickness(ThicknessKind),
 }
 

@@ -30,7 +30,7 @@ pub struct Comparison {
     pub combinations: Vec<Row>,
     /// Which way the objective is better that all runs have; `None` where theirs differ.
     #[serde(skip)]
-    goal: Option<Goal>,
+    pub(super) goal: Option<Goal>,
 }
 
 /// One combination.
@@ -150,22 +150,22 @@ impl Comparison {
 
     /// What the runs are compared by, if it is a number: the objective where all have the same, and else its share of their own
     /// beginnings.
-    pub(super) fn measured(&self, row: &Row) -> Option<f64> {
+    pub(super) fn compared_value(&self, row: &Row) -> Option<f64> {
         let value = if self.goal.is_some() { row.objective_best } else { row.ratio };
         value.filter(|value| value.is_finite())
     }
 
     /// That, in letters.
-    pub(super) fn measure(&self) -> &'static str {
+    pub(super) fn compared_symbol(&self) -> &'static str {
         if self.goal.is_some() { "F" } else { "F / F₀" }
     }
 
     /// The best of the rows that keep their constraints, where all have the same objective. Their beginnings may differ, so that the
     /// ratio says nothing.
     fn find_best(&self) -> Option<usize> {
-        let sign = if self.goal? == Goal::Minimise { 1.0 } else { -1.0 };
+        let sign = self.goal?.sign();
         let sound = self.combinations.iter().enumerate().filter(|(_, row)| row.violated.is_empty());
-        let known = sound.filter_map(|(index, row)| Some((index, sign * self.measured(row)?)));
+        let known = sound.filter_map(|(index, row)| Some((index, sign * self.compared_value(row)?)));
         known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)
     }
 }

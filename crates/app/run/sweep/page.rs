@@ -152,10 +152,10 @@ fn rows(comparison: &Comparison) -> Markup {
     html! {
         @if shown < all.len() { (note(&format!("The first {shown} of {} rows; sweep.csv has all.", all.len()))) }
         (table(&head, &rows, comparison.best))
-        @if comparison.best.is_some() {
-            (note("Marked: the best F of the runs that keep their constraints."))
-        } @else {
-            (note("The runs do not have the same objective, or no result yet that keeps the constraints: none is marked."))
+        @if comparison.goal.is_none() {
+            (note("The runs have different objectives: none is the best."))
+        } @else if comparison.best.is_some() {
+            (note("Marked: the best F of the runs that keep their constraints. Where a current or a frequency is swept, F follows that too."))
         }
     }
 }
@@ -196,4 +196,18 @@ fn cells(row: &Row) -> Vec<Markup> {
     ];
     let text = |text: &String| html! { (text) };
     row.values.iter().map(text).chain([run]).chain(texts.iter().map(text)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_says_what_speaks_against_it() {
+        let ended = Row { status: Some(RunStatus::Converged), ..Row::default() };
+        assert_eq!(ended.describe(), "converged");
+        let doubtful =
+            Row { violated: vec!["mass".to_owned()], verdict: Some(Verdict::NotConfirmed), ..ended };
+        assert_eq!(doubtful.describe(), "converged, violates mass, gain not confirmed");
+    }
 }

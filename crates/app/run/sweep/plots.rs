@@ -22,7 +22,7 @@ pub(super) fn over_value(comparison: &Comparison) -> Option<(String, Markup)> {
     let [key] = &comparison.keys[..] else { return None };
     let (unit, values) = numbers(&comparison.combinations)?;
     let rows = &comparison.combinations;
-    let known = |(i, row): (usize, &Row)| Some((i, [values[i], comparison.measured(row)?]));
+    let known = |(i, row): (usize, &Row)| Some((i, [values[i], comparison.compared_value(row)?]));
     let mut points: Vec<(usize, [f64; 2])> = rows.iter().enumerate().filter_map(known).collect();
     points.sort_by(|(_, a), (_, b)| a[0].total_cmp(&b[0]));
     let axis = if unit.is_empty() { key.clone() } else { format!("{key} [{unit}]") };
@@ -31,7 +31,7 @@ pub(super) fn over_value(comparison: &Comparison) -> Option<(String, Markup)> {
     let best = points.iter().find(|(i, _)| Some(*i) == comparison.best);
     let ring = best.map_or(String::new(), |best| format!("; best (ring): {}", describe(best)));
     let (first, last) = (describe(points.first()?), describe(points.last()?));
-    let measure = comparison.measure();
+    let measure = comparison.compared_symbol();
     let caption = format!("{measure} over {key}: {first}, {last}{ring}.");
     let x = Scale::around(points.iter().map(|(_, p)| p[0]), [LEFT + 10.0, WIDTH - RIGHT - 6.0]);
     let y = Scale::around(points.iter().map(|(_, p)| p[1]), [TOP + HEIGHT, TOP]);

@@ -11,7 +11,7 @@ use fluxmorph_optimizer::driver::Record;
 use super::ReportedRun;
 use super::field_file::{contents, field_contents};
 use crate::build::{Outline, build_mesh, outline};
-use crate::config::{Config, FieldsKept, SourceMap};
+use crate::config::{Config, FieldsKept, MeshConfig, SourceMap};
 use crate::error::Error;
 use crate::files::{Manifest, MeshHash, OutputError, Refinements, RunDirectory, RunResult};
 use crate::run::journal::{Journal, mesh_hash};
@@ -155,7 +155,15 @@ fn outline_of_run(
     if let Some(MeshHash { origin, blake3, .. }) = &manifest.mesh
         && *blake3 != mesh_hash(&mesh)
     {
-        return Err(format!("the mesh of {origin} is another than that of the run: restore the file"));
+        return Err(match &config.mesh {
+            MeshConfig::File { .. } => {
+                format!("the mesh of {origin} is another than that of the run: restore the file")
+            }
+            _ => format!(
+                "the mesh of the generator {origin} was made by version {} otherwise",
+                manifest.version
+            ),
+        });
     }
     outline((config, source), mesh, marks).map_err(unbuilt)
 }

@@ -68,7 +68,7 @@ impl ReportedRun {
     /// Reads manifest and configuration of the directory of a `run` or a `solve`.
     ///
     /// # Errors
-    /// [`Error::NoReport`] for what another command has written, faults of the configuration, files that are damaged or
+    /// [`Error::NoReport`] for what another command has written and for a configuration that has become another, faults of the configuration, files that are damaged or
     /// cannot be read.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
         Self::of(RunDirectory::open(disk, path)?)
@@ -122,7 +122,7 @@ impl ReportedRun {
     }
 }
 
-/// Whether a configuration is the one that a directory was made with, or one that its run may be resumed with.
+/// Whether a configuration is, to the letter, the one that a directory was made with, or one that its run may be resumed with.
 fn is_of_run(
     directory: &RunDirectory,
     manifest: &Manifest,

@@ -184,11 +184,10 @@ impl<'a> Run<'a> {
         self.settings.max_evaluations.saturating_sub(self.evaluations)
     }
 
-    /// Says how the search goes on, where there are evaluations left for it.
-    pub(super) fn note_going_on(&mut self, how: &str) {
-        if self.evaluations_left() > 0 {
-            self.observer.note(how);
-        }
+    /// Reports what has happened, and how the search goes on where no limit keeps it from that.
+    pub(super) fn note_going_on(&mut self, what: &str, plan: &str) {
+        let goes_on = self.evaluations_left() > 0 && self.limit_reached().is_none();
+        self.observer.note(&if goes_on { format!("{what}{plan}") } else { what.to_owned() });
     }
 
     pub(super) fn check_limits(&mut self) -> Result<(), Stop> {

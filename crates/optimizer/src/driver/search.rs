@@ -220,10 +220,8 @@ impl<'a> Search<'a> {
     pub(super) fn tighten_tolerance(&mut self, run: &mut Run<'_>) {
         self.tightenings += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
-        run.note_going_on(&format!(
-            "the method ended within its first steps: the search goes on with a relative tolerance of {:.0e}",
-            self.ftol_rel
-        ));
+        let plan = format!(": the search goes on with a relative tolerance of {:.0e}", self.ftol_rel);
+        run.note_going_on("the method ended within its first steps", &plan);
     }
 
     /// Continues with the worst constraint as the objective.
@@ -231,9 +229,8 @@ impl<'a> Search<'a> {
         self.is_restoring = true;
         (self.ftol_rel, self.tightenings) = (self.settings.ftol_rel, 0);
         self.move_trust_region(run);
-        run.note_going_on(
-            "no design yet keeps all constraints: the search goes on for one with the least violation",
-        );
+        let plan = ": the search goes on for one with the least violation";
+        run.note_going_on("no design yet keeps all constraints", plan);
     }
 
     /// Centres the trust region on the best design.
@@ -245,11 +242,11 @@ impl<'a> Search<'a> {
     pub(super) fn shrink_trust_region(&mut self, run: &mut Run<'_>, refused: &Refusal, gained: bool) {
         self.shrinks = if gained { 1 } else { self.shrinks + 1 };
         self.trust = TrustRegion::new(run.centre(), SHRINK * self.trust.scale);
-        run.note_going_on(&format!(
-            "{}; the search goes on within {:.2} % of the bound range around the best design",
-            refused.cause,
+        let plan = format!(
+            "; the search goes on within {:.2} % of the bound range around the best design",
             100.0 * self.trust.scale
-        ));
+        );
+        run.note_going_on(&refused.cause, &plan);
     }
 }
 

@@ -7,12 +7,12 @@ mod thickness_bound;
 mod wall_thickness;
 
 pub use thickness_bound::{MARGIN, ThicknessBound, ThicknessLimit};
-pub use wall_thickness::{Wall, WallThickness};
+pub use wall_thickness::{Wall, WallThickness, faces_with_bodies};
 
 /// The design has no thickness.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "the thickness along the design's direction is not defined: there is no body behind the design surface, or some \
-     line through it meets no opposite face; leave the thickness limit out, or give the body an entry in the regions"
+     line through it meets no opposite face; leave the thickness limit out, or give the body a material"
 )]
 pub struct NoThickness;

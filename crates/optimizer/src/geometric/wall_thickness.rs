@@ -8,11 +8,12 @@
 //!
 //! the initial one plus the node's height where that face is held. A node without direction has no thickness.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashMap};
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
-use fluxmorph_geometry::{Mesh, NodeId, RegionId};
+use fluxmorph_geometry::topology::Facet;
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
 use crate::design::DesignSurface;
 
@@ -30,6 +31,8 @@ struct Opposite {
     distance: f64,
     /// The triangle there.
     nodes: [NodeId; 3],
+    /// The region between, of the mesh that was measured.
+    body: RegionId,
 }
 
 /// The wall behind one design node.
@@ -52,23 +55,31 @@ impl WallThickness {
     /// Measures the bodies of the undeformed mesh, each behind its own part of the design surface; `None` where some ray does not meet
     /// an opposite face of its body.
     pub fn measure(mesh: &Mesh, bodies: &[RegionId], surface: &DesignSurface) -> Option<Self> {
-        let bodies: Vec<BodyFaces> =
-            bodies.iter().map(|region| BodyFaces::new(mesh, *region, surface)).collect();
-        let first = bodies.first()?;
-        let opposite = surface
-            .nodes()
-            .iter()
-            .zip(surface.directions())
-            .map(|(&node, direction): (&NodeId, &Point)| {
-                if *direction == [0.0; 3] {
-                    return Some(None);
-                }
-                let (origin, back) = (mesh.point(node), direction.map(|d| -d));
-                let body = bodies.iter().find(|body| body.designed_nodes.contains(&node)).unwrap_or(first);
-                // Of a body with two designed faces, the other one.
-                body.others.nearest(origin, back).or_else(|| body.designed.nearest(origin, back)).map(Some)
-            })
-            .collect::<Option<Vec<_>>>()?;
+        let of: BTreeMap<RegionId, BodyFaces> =
+            bodies.iter().map(|&region| (region, BodyFaces::new(mesh, region, surface))).collect();
+        let mut body_at: HashMap<NodeId, RegionId> = HashMap::new();
+        for (face, element) in faces_with_bodies(mesh, surface) {
+            let region = mesh.topology().region_of()[element.index()];
+            if of.contains_key(&region) {
+                face.iter().for_each(|&node| {
+                    body_at.entry(node).or_insert(region);
+                });
+            }
+        }
+        // What moves along a side of the only body belongs to it.
+        let only = <[RegionId; 1]>::try_from(bodies).ok().map(|[region]| region);
+        let opposite_of = |(&node, direction): (&NodeId, &Point)| {
+            if *direction == [0.0; 3] {
+                return Some(None);
+            }
+            let body = body_at.get(&node).copied().or(only)?;
+            let (faces, origin, back) = (&of[&body], mesh.point(node), direction.map(|d| -d));
+            // Of a body with two designed faces, the other one.
+            let found = faces.others.nearest(origin, back).or_else(|| faces.designed.nearest(origin, back));
+            found.map(|(distance, nodes)| Some(Opposite { distance, nodes, body }))
+        };
+        let opposite =
+            surface.nodes().iter().zip(surface.directions()).map(opposite_of).collect::<Option<Vec<_>>>()?;
         opposite.iter().any(Option::is_some).then_some(())?;
         Some(Self { opposite })
     }
@@ -117,6 +128,22 @@ impl WallThickness {
         thickness
     }
 
+    /// The least thickness [m] of every body where every node of the mesh is at `place` [m], by the regions of the mesh that was
+    /// measured.
+    pub fn least_of_bodies(
+        &self,
+        surface: &DesignSurface,
+        place: impl Fn(NodeId) -> Point,
+    ) -> BTreeMap<RegionId, f64> {
+        let mut least = BTreeMap::new();
+        let bodies = self.opposite.iter().flatten().map(|opposite| opposite.body);
+        for ((_, wall), body) in self.walls(surface, place).zip(bodies) {
+            let own = least.entry(body).or_insert(f64::INFINITY);
+            *own = wall.thickness.min(*own);
+        }
+        least
+    }
+
     /// Least and greatest thickness [m] on a moved mesh.
     pub fn range(&self, surface: &DesignSurface, mesh: &Mesh) -> (f64, f64) {
         self.walls(surface, |n| mesh.point(n))
@@ -139,25 +166,42 @@ fn wall((node, direction): (NodeId, Point), opposite: [NodeId; 3], place: &impl 
     Wall { thickness, derivatives: derivatives.map(|(n, weight)| (n, derivative(weight))) }
 }
 
+/// The faces between two regions that are part of the design surface, each with the element behind it, against the direction of
+/// motion; without those that run along it.
+pub fn faces_with_bodies(mesh: &Mesh, surface: &DesignSurface) -> Vec<([NodeId; 3], ElementId)> {
+    let direction_at = |node: &NodeId| {
+        let row = surface.nodes().binary_search(node).ok()?;
+        Some(surface.directions()[row]).filter(|direction| *direction != [0.0; 3])
+    };
+    let with_body = |facet: &Facet| {
+        let outside = facet.outside?;
+        facet.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()).then_some(())?;
+        let direction = facet.nodes.iter().find_map(direction_at)?;
+        let corners = facet.nodes.map(|n| mesh.point(n));
+        let is_ahead = dot(area_vector(corners), direction) > 0.0;
+        (!runs_along(direction, &corners))
+            .then_some((facet.nodes, if is_ahead { facet.inside } else { outside }))
+    };
+    mesh.topology().facets().iter().filter_map(with_body).collect()
+}
+
 /// The faces of a body that are part of the design surface, and its others.
 struct BodyFaces {
     designed: Faces,
     others: Faces,
-    designed_nodes: HashSet<NodeId>,
 }
 
 impl BodyFaces {
     fn new(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Self {
         let topology = mesh.topology();
-        let region_at = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
+        let is_own = |e: ElementId| topology.region_of()[e.index()] == region;
         let (designed, others): (Vec<[NodeId; 3]>, Vec<[NodeId; 3]>) = topology
             .facets()
             .iter()
-            .filter(|f| (region_at(f.inside) == region) != f.outside.is_some_and(|e| region_at(e) == region))
+            .filter(|f| is_own(f.inside) != f.outside.is_some_and(is_own))
             .map(|f| f.nodes)
             .partition(|nodes| nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()));
-        let designed_nodes = designed.iter().flatten().copied().collect();
-        Self { designed: Faces::new(mesh, designed), others: Faces::new(mesh, others), designed_nodes }
+        Self { designed: Faces::new(mesh, designed), others: Faces::new(mesh, others) }
     }
 }
 
@@ -175,8 +219,8 @@ impl Faces {
         Self { nodes, corners, tree }
     }
 
-    /// The nearest face that a ray meets; one that it runs along, if there is no other.
-    fn nearest(&self, origin: Point, direction: Point) -> Option<Opposite> {
+    /// The nearest face that a ray meets, with the distance [m]; one that it runs along, if there is no other.
+    fn nearest(&self, origin: Point, direction: Point) -> Option<(f64, [NodeId; 3])> {
         let hits = self.tree.hits(origin, direction);
         // From a rim the ray runs along the facets of the body's side, and a round side is no plane.
         let across = |i: &usize| !runs_along(direction, &self.corners[*i]);
@@ -186,7 +230,7 @@ impl Faces {
         };
         let found = nearest(&mut hits.iter().copied().filter(across));
         let (distance, i) = found.or_else(|| nearest(&mut hits.iter().copied()))?;
-        Some(Opposite { distance, nodes: self.nodes[i] })
+        Some((distance, self.nodes[i]))
     }
 }
 
@@ -251,45 +295,62 @@ mod tests {
         assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
     }
 
-    /// Two plates one behind the other, each with its lower face in the design: what lies behind one is its own upper face.
-    #[test]
-    fn every_body_has_its_own_thickness() {
-        let plate = |name: &str, from: f64, to: f64| BoxRegion {
-            name: name.to_owned(),
-            corners: [[0.0, 0.0, from], [1.0, 1.0, to]],
+    /// Layers between these heights with air below and above, and the lower face of each as the design, which moves along z.
+    fn layers(heights: &[(&str, [f64; 2])], direction: f64) -> (Mesh, DesignSurface) {
+        let layer = |(name, [from, to]): &(&str, [f64; 2])| BoxRegion {
+            name: (*name).to_owned(),
+            corners: [[0.0, 0.0, *from], [1.0, 1.0, *to]],
             size: [0.5; 3],
             skin: [f64::INFINITY; 3],
             cells: None,
         };
         let mesh = boxes(&BoxesParameters {
             corners: [[0.0, 0.0, -0.5], [1.0, 1.0, 1.7]],
-            regions: vec![plate("thin", 0.0, 0.1), plate("thick", 1.0, 1.2)],
+            regions: heights.iter().map(layer).collect(),
             sizes: vec![],
             surfaces: vec![],
             growth: 2.0,
             refinement: 1.0,
             division: None,
         })
-        .expect("two plates");
-        let topology = mesh.topology();
-        let [thin, thick] = ["thin", "thick"].map(|name| topology.region(name).expect("it has both"));
-        let at = |z: f64| {
-            let faces = topology.facets().iter().map(|facet| facet.nodes);
-            faces
-                .filter(|face| face.iter().all(|n| (mesh.point(*n)[2] - z).abs() < 1e-12))
-                .collect::<Vec<_>>()
+        .expect("layers");
+        let place = usize::from(direction > 0.0);
+        let is_designed = |face: &[NodeId; 3]| {
+            let at = |z: f64| face.iter().all(|n| (mesh.point(*n)[2] - z).abs() < 1e-12);
+            heights.iter().any(|(_, ends)| at(ends[place]))
         };
-        let lower = [at(0.0), at(1.0)].concat();
-        let surface =
-            DesignSurface::new(&mesh, &DesignSetup::new(&lower, Direction::Along([0.0, 0.0, -1.0])))
-                .expect("every node is a variable");
-        let thickness = WallThickness::measure(&mesh, &[thin, thick], &surface).expect("both have two faces");
-        for (i, t) in thickness.at_nodes() {
-            let expected = if mesh.point(surface.nodes()[i])[2] < 0.5 { 0.1 } else { 0.2 };
-            assert!((t - expected).abs() < 1e-12, "{t} {expected}");
+        let faces: Vec<[NodeId; 3]> =
+            mesh.topology().facets().iter().map(|facet| facet.nodes).filter(is_designed).collect();
+        let setup = DesignSetup::new(&faces, Direction::Along([0.0, 0.0, direction]));
+        let surface = DesignSurface::new(&mesh, &setup).expect("every node is a variable");
+        (mesh, surface)
+    }
+
+    /// Plates one behind the other and touching ones, whichever region comes first: what lies behind a face is its own body.
+    #[test]
+    fn every_body_has_its_own_thickness() {
+        let (apart, touching) = ([[0.0, 0.1], [1.0, 1.2]], [[0.0, 0.1], [0.1, 0.3]]);
+        for (ends, direction) in [(apart, -1.0), (apart, 1.0), (touching, -1.0), (touching, 1.0)] {
+            for names in [["thin", "thick"], ["thick", "thin"]] {
+                let mut heights = [("thin", ends[0]), ("thick", ends[1])];
+                heights.sort_by_key(|(name, _)| *name != names[0]);
+                let (mesh, surface) = layers(&heights, direction);
+                let regions = names.map(|name| mesh.topology().region(name).expect("it has both"));
+                let thickness =
+                    WallThickness::measure(&mesh, &regions, &surface).expect("both have two faces");
+                let designed = usize::from(direction > 0.0);
+                for (i, t) in thickness.at_nodes() {
+                    let is_thin = (mesh.point(surface.nodes()[i])[2] - ends[0][designed]).abs() < 1e-9;
+                    let expected = if is_thin { 0.1 } else { 0.2 };
+                    assert!((t - expected).abs() < 1e-12, "{ends:?} {direction} {names:?}: {t} {expected}");
+                }
+                assert_eq!(thickness.at_nodes().count(), surface.nodes().len());
+                let least = thickness.least_of_bodies(&surface, |n| mesh.point(n));
+                let of = |name: &str| least[&mesh.topology().region(name).expect("it has both")];
+                assert!((of("thin") - 0.1).abs() < 1e-12 && (of("thick") - 0.2).abs() < 1e-12);
+                assert!(WallThickness::measure(&mesh, &[], &surface).is_none());
+            }
         }
-        assert_eq!(thickness.at_nodes().count(), surface.nodes().len());
-        assert!(WallThickness::measure(&mesh, &[], &surface).is_none());
     }
 
     #[test]

@@ -37,7 +37,7 @@ impl Shape {
         Self { surface, motion, least_quality, thickness: None, lower, upper, initial }
     }
 
-    /// The same with the thickness of the designed body.
+    /// The same with the thickness of the designed bodies.
     #[must_use]
     pub fn with_thickness(self, thickness: Option<WallThickness>) -> Self {
         Self { thickness, ..self }

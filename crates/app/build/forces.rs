@@ -1,0 +1,102 @@
+//! Bodies whose force or torque means little: of air, of iron that goes on outside of them, and cut by an outer face.
+
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
+use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
+use fluxmorph_solver::coil;
+
+use super::entries::material;
+use super::plausible::{INCLINED, place_of_current, windings};
+use super::references::functionals;
+use super::soundness::faces_of;
+use crate::config::{Coil, CoilShape, Config, ForceBody, ObjectiveKind};
+
+/// What is to be said of all bodies; `coils` are those of the configuration.
+pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
+    let bodies = config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body));
+    bodies.chain(cut_warnings(config, mesh)).collect()
+}
+
+/// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
+fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &ForceBody) -> Option<String> {
+    let topology = mesh.topology();
+    let is_iron = |name: &str| material(config, name).relative_permeability != 1.0;
+    let acts = |name: &String| {
+        let is_magnet = config.regions.get(name).is_some_and(|region| region.remanence.is_some());
+        let is_wound = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == *name);
+        let conducts = config.alternates() && material(config, name).conductivity > 0.0;
+        is_iron(name) || is_magnet || conducts || config.coils.iter().any(is_wound)
+    };
+    let (name, regions) = (&body.name, body.regions.join("`, `"));
+    let is_own = |e: ElementId| body.regions.iter().any(|name| name == topology.region_name_at(e));
+    let holds_a_coil =
+        || windings(coils).any(|(_, winding)| place_of_current(mesh, winding, is_own).is_some());
+    if !body.regions.iter().any(acts) && !holds_a_coil() {
+        return Some(format!(
+            "no force acts on the body `{name}`: nothing in `{regions}` is magnetic or carries a current, and what is computed is \
+             that on what lies beside it"
+        ));
+    }
+    let region = |name: &&String| topology.region(name).ok().filter(|_| is_iron(name));
+    let own: Vec<RegionId> = body.regions.iter().filter_map(|name| region(&name)).collect();
+    let touches = |other: RegionId| own.iter().any(|&own| !topology.interface(own, other).is_empty());
+    let mut outside = topology.region_names().iter().filter(|name| !body.regions.contains(name));
+    let joined = outside.find(|name| region(name).is_some_and(touches))?;
+    Some(format!(
+        "the body `{name}` is joined to the iron of `{joined}`: where iron meets iron the force on one side depends on the mesh; \
+         take `{joined}` into its regions, or leave air between the two"
+    ))
+}
+
+/// What to say of forces and torques that are sought across a plane which cuts their body: of these only a part is computed.
+fn cut_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let topology = mesh.topology();
+    let mut warnings = Vec::new();
+    for (path, own) in functionals(config) {
+        let Some(body) = config.forces.iter().find(|body| Some(&body.name) == own.region.as_ref()) else {
+            continue;
+        };
+        let direction = own.direction.unwrap_or_default();
+        // Of the virtual motion of the body.
+        let velocity = |x: Point| match own.kind {
+            ObjectiveKind::Force => direction,
+            ObjectiveKind::Torque => cross(direction, sub(x, body.about)),
+            _ => [0.0; 3],
+        };
+        let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
+        let outside: Vec<[NodeId; 3]> = regions.flat_map(|region| topology.outer_faces(region)).collect();
+        // Outer faces hold the nodes of the body (`Force`), with a condition or without.
+        let goes_across = |face: &[NodeId; 3]| {
+            let corners = face.map(|node| mesh.point(node));
+            let (area, v) = (area_vector(corners), velocity(centroid(corners)));
+            dot(v, area).abs() > INCLINED * norm(v) * norm(area)
+        };
+        let cut = config.boundaries.surfaces().find(|surface| {
+            let faces = faces_of(topology, [surface.as_str()]);
+            outside.iter().any(|face| faces.contains(&face_key(*face)) && goes_across(face))
+        });
+        let natural = || {
+            let named = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
+            let face = outside.iter().find(|face| !named.contains(&face_key(**face)) && goes_across(face))?;
+            let place = millimetres(centroid(face.map(|node| mesh.point(node))));
+            Some(format!("the outer face at {place}, which has no condition,"))
+        };
+        let cut = cut.map(|surface| format!("the surface `{surface}`")).or_else(natural);
+        if let Some(surface) = cut {
+            let is_magnet =
+                |name: &String| config.regions.get(name).is_some_and(|own| own.remanence.is_some());
+            let of_magnet = if body.regions.iter().any(is_magnet) {
+                "; of a magnet it comes from the singular field beside the cut, and its error bar is far too small"
+            } else {
+                ""
+            };
+            warnings.push(format!(
+                "{path}: {surface} cuts the body `{}`, and what is computed across it is that on the free faces of \
+                 the meshed part, without the stress in the cut; on half of a symmetric body that is not a force on anything{of_magnet}. \
+                 Take a direction along the surface, or mesh the whole body",
+                body.name
+            ));
+        }
+    }
+    warnings
+}
