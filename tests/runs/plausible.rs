@@ -503,7 +503,7 @@ fn a_near_wall_is_named_with_the_error_that_no_bar_has() {
             finish(command(&[&"check", &quick(), &"--json"]).args(set(&[&half]))).exits_with(0).json();
         (checked["truncation"]["surface"].clone(), number(&checked, "/truncation/distance_m"))
     };
-    let (far, near) = (wall("60 mm"), wall("480 mm"));
+    let (far, near) = (wall("60 mm"), wall("560 mm"));
     println!("{far:?} {near:?}");
     assert_eq!(near.0, "x_max");
     assert!(near.1 < 0.05 && far.1 > 0.3);
@@ -522,4 +522,15 @@ fn a_near_wall_is_named_with_the_error_that_no_bar_has() {
     let conditions = "boundaries.flux_parallel=[\"x_min\", \"y_min\"]";
     let open = "open.surfaces=[\"x_max\", \"y_max\", \"z_min\", \"z_max\"]";
     assert_eq!(near_wall("open", &[estimated, conditions, open]), Value::Null);
+}
+
+/// Of a component that a plane of symmetry keeps the mean is the device's; of another one only that of the meshed part.
+#[test]
+fn the_homogeneity_of_a_component_that_images_change_is_asked_about() {
+    let said = |direction: &str| {
+        let direction = format!("objective.direction={direction}");
+        let region = ["objective.kind=homogeneity", "objective.region=observation", &direction];
+        check(&region).contains("images of `observation` have another component")
+    };
+    assert!(said("[1, 0, 1]") && said("[1, 0, 0]") && !said("[0, 0, 1]"));
 }

@@ -14,9 +14,11 @@ use fluxmorph_solver::coil::{self, Racetrack};
 use rayon::prelude::*;
 
 use super::entries::material;
+use super::references::functionals;
 use super::soundness::faces_of;
 use crate::config::{
-    Coil, CoilPath, CoilShape, ConductorWord, Config, Diagnostic, MeshConfig, RegionModel, SourceMap,
+    Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, MeshConfig,
+    ObjectiveKind, RegionModel, SourceMap,
 };
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
@@ -179,6 +181,7 @@ pub(super) fn warnings(
     );
     warnings.extend(super::forces::warnings(config, mesh, coils));
     warnings.extend(phase_warnings(config));
+    warnings.extend(component_warnings(config, mesh));
     warnings.extend(unit_hint(config, mesh));
     warnings
 }
@@ -315,6 +318,36 @@ pub(super) fn beside(across: f64) -> f64 {
 pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
     let area = area_vector(face.map(|node| mesh.points()[node.index()]));
     area.map(|component| component / norm(area))
+}
+
+/// What to say of the homogeneity of a component that is another one in the images of its region: the mean is not the device's.
+fn component_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let topology = mesh.topology();
+    let conditions = &config.boundaries;
+    let planes = conditions.flux_parallel.iter().map(|name| (name, true));
+    let planes: Vec<(&String, bool)> =
+        planes.chain(conditions.flux_normal.iter().map(|name| (name, false))).collect();
+    let of = |(path, own): (String, &Functional)| {
+        let is_component = own.kind == ObjectiveKind::Homogeneity
+            && own.compare.is_none_or(|compared| compared == Compared::Component);
+        let (direction, name) = (own.direction.filter(|_| is_component)?, own.region.as_ref()?);
+        let faces = topology.outer_faces(topology.region(name).ok()?);
+        let turns = |face: &[NodeId; 3], keeps_along: bool| {
+            let across = dot(normal(mesh, *face), direction).abs() / norm(direction);
+            if keeps_along { across > INCLINED } else { across < beside(INCLINED) }
+        };
+        let is_turned = |(plane, keeps_along): &&(&String, bool)| {
+            let own = faces_of(topology, [plane.as_str()]);
+            faces.iter().any(|face| own.contains(&face_key(*face)) && turns(face, *keeps_along))
+        };
+        let (plane, _) = planes.iter().find(is_turned)?;
+        Some(format!(
+            "{path}: behind `{plane}` the images of `{name}` have another component along this direction, and what is computed is the \
+             deviation of the meshed part from its own mean, which is not that of the whole device; take a direction that the plane \
+             keeps, or mesh all of `{name}`"
+        ))
+    };
+    functionals(config).into_iter().filter_map(of).collect()
 }
 
 /// What to say of phases of more than a turn: degrees without their unit.

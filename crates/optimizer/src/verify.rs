@@ -140,7 +140,8 @@ pub struct Named {
 /// Measures the certificates of a problem's objective and constraints at the design `p`; `progress` gets the name of the
 /// constraint, if it is one, after each direction. `interrupted` is asked before each evaluation.
 ///
-/// The directions are the same for all, and each design is evaluated once. Where the mesh does not carry the first step, all begins
+/// Of a worst case it is the term that is the worst at `p`: where two are equal the worst of them has no gradient. The directions are
+/// the same for all, and each design is evaluated once. Where the mesh does not carry the first step, all begins
 /// anew with half of it, down to a sixteenth.
 ///
 /// # Errors
@@ -183,6 +184,10 @@ fn certify_at(
     progress: &mut dyn FnMut(Option<&str>, usize, &Direction),
 ) -> Result<Certificates, Error> {
     let span = span(problem);
+    let objective = base.objective.expect("a certificate needs an objective");
+    // The gradient is that of the term which is the worst here; where two of them are, the worst one has none.
+    let values = base.member_values();
+    let active = problem.objective().filter(|_| !values.is_empty()).map(|own| own.worst(&values));
     let known: RefCell<BTreeMap<Vec<u64>, Vec<f64>>> = RefCell::default();
     let value = |p: &[f64], index: usize| -> Result<f64, Error> {
         let key: Vec<u64> = p.iter().map(|x| x.to_bits()).collect();
@@ -191,12 +196,11 @@ fn certify_at(
         }
         Error::check_interrupted(interrupted)?;
         let cache = &mut cache.without_initial_guess();
-        let values = numbers(&problem.evaluate(p, Derivatives::None, cache, &mut NoProgress)?);
+        let values = numbers(&problem.evaluate(p, Derivatives::None, cache, &mut NoProgress)?, active);
         let value = values[index];
         known.borrow_mut().insert(key, values);
         Ok(value)
     };
-    let objective = base.objective.expect("a certificate needs an objective");
     let gradient = base.gradient.as_ref().expect("the gradient was asked for");
     let function = |p: &[f64]| value(p, 0);
     let report = |index: usize, direction: &Direction| progress(None, index, direction);
@@ -232,9 +236,12 @@ impl Certificates {
     }
 }
 
-/// Objective and constraints of a design.
-fn numbers(analysis: &Analysis) -> Vec<f64> {
-    let objective = analysis.objective.expect("a certificate needs an objective");
+/// Objective, of a worst case the `active` term, and constraints of a design.
+fn numbers(analysis: &Analysis, active: Option<usize>) -> Vec<f64> {
+    let objective = match active {
+        Some(term) => analysis.members[term].value,
+        None => analysis.objective.expect("a certificate needs an objective"),
+    };
     std::iter::once(objective).chain(analysis.constraints.iter().map(|c| c.value)).collect()
 }
 

@@ -96,15 +96,31 @@ fn sums_over_loads_and_quantities_of_one_are_exact() {
     all_hold_on(&problem, uneven);
 }
 
+/// The worse of the losses under two loads, the second one with a weight.
+fn worse_of_two(weight: f64) -> Problem {
+    let terms = format!(
+        "combine = \"worst_case\"\n[[objective.terms]]\nkind = \"loss\"\nregion = \"plate\"\nload = \"both\"\n\
+         [[objective.terms]]\nkind = \"loss\"\nregion = \"plate\"\nload = \"fast\"\nweight = {weight:e}\n"
+    );
+    problem(&terms, LOADS, &[])
+}
+
+/// Where two terms are equal the worst of them has a kink, and what is certified is the one whose gradient is taken.
+#[test]
+fn the_gradient_at_a_tie_is_that_of_one_term() {
+    let alone = worse_of_two(1.0);
+    let [both, fast] = analysed(&alone, &uneven(&alone)).member_values()[..] else { panic!("two terms") };
+    let tied = worse_of_two(both / fast);
+    let [first, second] = analysed(&tied, &uneven(&tied)).member_values()[..] else { panic!("two terms") };
+    assert!((first / second - 1.0).abs() < 1e-14);
+    all_hold_on(&tied, uneven);
+}
+
 /// Either term of a worst case has its own exact gradient, on both sides of where they meet.
 #[test]
 fn the_worst_of_loads_has_the_gradient_of_that_load() {
-    for (weight, worst) in [("1", "both"), ("40", "fast")] {
-        let terms = format!(
-            "combine = \"worst_case\"\n[[objective.terms]]\nkind = \"loss\"\nregion = \"plate\"\nload = \"both\"\n\
-             [[objective.terms]]\nkind = \"loss\"\nregion = \"plate\"\nload = \"fast\"\nweight = {weight}\n"
-        );
-        let problem = problem(&terms, LOADS, &[]);
+    for (weight, worst) in [(1.0, "both"), (40.0, "fast")] {
+        let problem = worse_of_two(weight);
         let analysis = analysed(&problem, &uneven(&problem));
         let objective = problem.objective().expect("an objective");
         let values: Vec<f64> = analysis.members.iter().map(|member| member.value).collect();

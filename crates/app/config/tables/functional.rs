@@ -132,7 +132,8 @@ choice! {
         TargetField = "target_field" | "uniformity",
         /// Deviation from the field's own mean, whatever that is: Σ w |b − b̄|² / Σ w |b̄|² [1], the square of the relative rms
         /// deviation, for b as `compare` says; the result has its figures in ppm. The mean of a vector is that of the whole device where
-        /// the region ends at symmetry planes of `[boundaries]`. Where the mesh moves there, see `follow`.
+        /// the region ends at symmetry planes of `[boundaries]`; that of a component is that of the meshed part, and a direction that the
+        /// images turn round, or that is oblique to a plane, is warned of. Where the mesh moves there, see `follow`.
         Homogeneity = "homogeneity",
         /// Mean over the region of B·`direction` [T]; in harmonics the magnitude of its phasor. Where the mesh moves there, see `follow`.
         FieldComponent = "field_component",
