@@ -111,7 +111,9 @@ fn what_is_another_mesh_or_configuration_than_that_of_the_run_is_not_shown_as_it
     fluxmorph(&[&"run", &folder.join("block.toml"), &"--out", &out, &"--quiet"]).completed();
     assert!(!report(&out).contains("Not shown"));
     let own = std::fs::read(folder.join("device.msh")).expect("read");
-    let other = block("solve", &home.path().join("third"), &[("cells = [2, 2, 1]", "cells = [2, 3, 1]")]);
+    let third = home.path().join("third");
+    std::fs::create_dir(&third).expect("made");
+    let other = block("solve", &third, &[("cells = [2, 2, 1]", "cells = [2, 3, 1]")]);
     std::fs::copy(other.join("optimum.msh"), folder.join("device.msh")).expect("copied");
     let page = report(&out);
     assert!(

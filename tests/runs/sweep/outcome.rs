@@ -79,7 +79,7 @@ fn the_best_is_that_of_the_objective_and_not_of_its_ratio() {
     assert!(home.text("begun/sweep.html").contains("Marked: the best F of the runs"));
     assert_eq!(sweep("of_two", "objective.goal=minimise,maximise")["best"], Value::Null);
     let page = home.text("of_two/sweep.html");
-    assert!(page.contains("none is marked") && !page.contains("drawn bold"));
+    assert!(page.contains("none is the best") && !page.contains("drawn bold"));
 }
 
 #[test]
