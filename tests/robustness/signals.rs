@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use fluxmorph::Error;
-use fluxmorph::files::system_disk;
+use fluxmorph::files::{RunStatus, system_disk};
 use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::{Observer, RunObserver, Silent};
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -305,36 +305,47 @@ impl Observer for AtEstimate<'_> {
 
 impl RunObserver for AtEstimate<'_> {}
 
-/// A signal within the estimate that a refinement follows from: that refinement is not begun, and the run that is resumed makes it.
+/// A signal within the estimate that a refinement follows from, before the search and after it: that refinement is not begun, and the
+/// run that is resumed makes it.
 #[test]
 fn a_signal_while_the_mesh_is_refined_begins_no_further_refinement() {
     let edges = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
-    let tolerance = ("[output]", "[accuracy]\ntolerance = \"2 %\"\n\n[output]");
+    let tolerance = ("[output]", "[accuracy]\ntolerance = \"3.2 %\"\n\n[output]");
+    let many = ("max_evaluations = 6", "max_evaluations = 60");
     let home = folder();
-    let (mut config, source) = parsed(&changed(BLOCK, &[edges, tolerance]));
+    let (mut config, source) = parsed(&changed(BLOCK, &[edges, tolerance, many]));
     let disk = system_disk();
-    let refinements = |out: &Path| match std::fs::read_to_string(out.join("refinements.json")) {
-        Ok(text) => text.matches("\"blake3\"").count(),
-        Err(_) => 0,
+    let evaluations_before = |out: &Path| -> Vec<u64> {
+        let Ok(text) = std::fs::read_to_string(out.join("refinements.json")) else { return Vec::new() };
+        let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let steps = json["refinements"].as_array().expect("a list").iter();
+        steps.map(|step| step["evaluations"].as_u64().expect("a number")).collect()
     };
     config.output.directory = home.path().join("whole");
     let whole = run::run(&config, &source, options(&disk), &mut Silent).expect("it ends");
-    let all = refinements(&config.output.directory);
-    assert!(all > 1, "{all} refinements");
-    for before in [0, all - 1] {
+    let all = evaluations_before(&config.output.directory);
+    println!("refinements after {all:?} evaluations");
+    let before_search = all.iter().filter(|evaluations| **evaluations == 0).count();
+    assert!(before_search > 0 && before_search < all.len(), "{all:?}");
+    // The last estimate before the search is within the tolerance.
+    for (before, made) in [(0, 0), (before_search + 1, before_search)] {
         let out = home.path().join(before.to_string());
         config.output.directory = out.clone();
         let signal = Cell::new(false);
         let interrupted = || signal.get();
         let asking = Options { interrupted: &interrupted, ..options(&disk) };
         let mut observer = AtEstimate { before, signal: &signal };
-        let cut = run::run(&config, &source, asking, &mut observer);
-        assert!(matches!(cut, Err(Error::Optimizer(OptimizerError::InterruptedRun))), "{before}");
-        assert_eq!(refinements(&out), before);
+        match run::run(&config, &source, asking, &mut observer) {
+            Ok(cut) => assert!(made > 0 && cut.status == RunStatus::Interrupted, "{:?}", cut.status),
+            Err(error) => {
+                assert!(matches!(error, Error::Optimizer(OptimizerError::InterruptedRun)) && made == 0)
+            }
+        }
+        assert_eq!(evaluations_before(&out).len(), made);
         let saved = SavedRun::open(&disk, &out).expect("a run");
         let resumed =
             run::resume(&saved, RunLimits::default(), options(&disk), &mut Silent).expect("it ends");
-        assert_eq!(refinements(&out), all);
+        assert_eq!(evaluations_before(&out), all);
         assert_eq!(resumed.objective, whole.objective);
     }
 }

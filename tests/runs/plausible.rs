@@ -527,10 +527,16 @@ fn a_near_wall_is_named_with_the_error_that_no_bar_has() {
 /// Of a component that a plane of symmetry keeps the mean is the device's; of another one only that of the meshed part.
 #[test]
 fn the_homogeneity_of_a_component_that_images_change_is_asked_about() {
-    let said = |direction: &str| {
+    let said = |conditions: &[&str], direction: &str| {
         let direction = format!("objective.direction={direction}");
-        let region = ["objective.kind=homogeneity", "objective.region=observation", &direction];
-        check(&region).contains("images of `observation` have another component")
+        let objective = ["objective.kind=homogeneity", "objective.region=observation", &direction];
+        check(&[conditions, &objective].concat()).contains("images of `observation` have another component")
     };
-    assert!(said("[1, 0, 1]") && said("[1, 0, 0]") && !said("[0, 0, 1]"));
+    assert!(said(&[], "[1, 0, 1]") && said(&[], "[1, 0, 0]") && !said(&[], "[0, 0, 1]"));
+    // A flux-normal plane keeps what is normal to it, and turns the rest round.
+    let normal = [
+        "boundaries.flux_normal=[\"x_min\"]",
+        "boundaries.flux_parallel=[\"x_max\", \"y_min\", \"y_max\", \"z_min\", \"z_max\"]",
+    ];
+    assert!(!said(&normal, "[1, 0, 0]") && said(&normal, "[0, 0, 1]") && said(&normal, "[1, 0, 1]"));
 }

@@ -334,7 +334,7 @@ fn component_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         let faces = topology.outer_faces(topology.region(name).ok()?);
         let turns = |face: &[NodeId; 3], keeps_along: bool| {
             let across = dot(normal(mesh, *face), direction).abs() / norm(direction);
-            if keeps_along { across > INCLINED } else { across < beside(INCLINED) }
+            if keeps_along { across > INCLINED } else { beside(across) > INCLINED }
         };
         let is_turned = |(plane, keeps_along): &&(&String, bool)| {
             let own = faces_of(topology, [plane.as_str()]);

@@ -225,16 +225,19 @@ pub(super) fn shape(
     Ok(shape)
 }
 
-/// The regions that a positive design thickens, ascending: behind the design surface, and not air.
+/// The regions that a positive design thickens, ascending: behind the design surface, with an entry of their own, and of air only where
+/// all of them are.
 pub(super) fn thickened_regions(mesh: &Mesh, surface: &DesignSurface, config: &Config) -> Vec<RegionId> {
     let topology = mesh.topology();
-    let is_body = |region: &RegionId| {
-        let name = &topology.region_names()[region.index()];
-        config.regions.contains_key(name) && !is_air(config, name)
-    };
+    let name = |region: &RegionId| &topology.region_names()[region.index()];
     let behind = faces_with_bodies(mesh, surface);
     let behind = behind.into_iter().map(|(_, element)| topology.region_of()[element.index()]);
-    behind.filter(is_body).collect::<BTreeSet<_>>().into_iter().collect()
+    let mut bodies: BTreeSet<RegionId> =
+        behind.filter(|region| config.regions.contains_key(name(region))).collect();
+    if !bodies.iter().all(|region| is_air(config, name(region))) {
+        bodies.retain(|region| !is_air(config, name(region)));
+    }
+    bodies.into_iter().collect()
 }
 
 /// Refuses bounds at which nothing is left of the body: all variables there, somewhere, take more than its thickness.

@@ -1,5 +1,5 @@
 //! How far the walls of the mesh are from what makes and bends the field: what they cut off is not computed. A flux-normal
-//! surface is taken for a symmetry plane, and so is one that coils or matter reach; one of a uniform field is where that comes from.
+//! surface is taken for a symmetry plane, and so is one that coils or matter reach.
 
 use std::collections::HashSet;
 
@@ -45,10 +45,9 @@ impl Truncation {
         let outer: HashSet<_> =
             topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
         let distance = |name: &str| -> Option<f64> {
-            let is_no_wall = |(own, boundary): &(String, Boundary)| {
-                own == name && matches!(boundary, Boundary::FluxNormal | Boundary::UniformField(_))
-            };
-            if model.setup().boundaries.iter().any(is_no_wall) {
+            let is_symmetry =
+                |(own, boundary): &(String, Boundary)| own == name && *boundary == Boundary::FluxNormal;
+            if model.setup().boundaries.iter().any(is_symmetry) {
                 return None;
             }
             let triangles = topology.surface(name).ok()?;
@@ -78,7 +77,7 @@ impl Truncation {
         (ratio < NEAR).then(|| {
             format!(
                 "the wall `{surface}` is {:.3} mm from coils and matter, {ratio:.1} times their half diagonal: where it stands for open \
-                 space, no error bar counts what it cuts off; walls farther off, or [open], show how much that is",
+                 space, no error bar counts what it cuts off; walls farther off show how much that is",
                 Millimetres(*distance_m)
             )
         })
@@ -107,4 +106,17 @@ fn analytic_coils(model: &FieldModel, mesh: &Mesh) -> Vec<Point> {
         CoilShape::Region(_) | CoilShape::Solid(_) => None,
     });
     boxes.flatten().map(within).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wall_is_near_within_twice_the_half_diagonal() {
+        let at = |distance_m: f64| Truncation { surface: "x_max".to_owned(), distance_m, source_size_m: 0.1 };
+        let text = at(0.19).described().expect("it is near");
+        assert!(text.contains("`x_max` is 190.000 mm from coils and matter, 1.9 times"), "{text}");
+        assert_eq!(at(0.21).described(), None);
+    }
 }

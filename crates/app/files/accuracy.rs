@@ -107,13 +107,10 @@ pub enum Verdict {
 }
 
 impl Accuracy {
-    /// Of an analysis with an objective and its estimated error.
-    pub fn of_analysis(objective: f64, error: f64) -> Self {
-        Self {
-            error_estimate_relative: relative(error, objective),
-            error_estimate: Some([error; 2]),
-            ..Self::default()
-        }
+    /// The same with the estimated error of the objective of an analysis.
+    #[must_use]
+    pub fn of_analysis(self, objective: f64, error: f64) -> Self {
+        Self { error_estimate_relative: relative(error, objective), error_estimate: Some([error; 2]), ..self }
     }
 
     /// Enters how the mesh was refined.
@@ -126,6 +123,11 @@ impl Accuracy {
             error_estimate_relative: relative(step.error_estimate, step.objective),
         };
         self.levels = refinements.refinements.iter().map(level).collect();
+    }
+
+    /// Whether there is something that no estimate of the field counts.
+    pub fn says_something_of_the_geometry(&self) -> bool {
+        self.facets.is_some() || self.near_wall.is_some()
     }
 
     /// Enters the estimated errors of the objective at both designs of a run; its values without them.
@@ -216,6 +218,6 @@ mod tests {
         let error = accuracy.error_estimate_relative.expect("a number");
         // One rounding of each of a few operations.
         assert!((error - 0.1).abs() < 1e-15, "{error}");
-        assert_eq!(Accuracy::of_analysis(0.0, 1.0).error_estimate_relative, None);
+        assert_eq!(Accuracy::default().of_analysis(0.0, 1.0).error_estimate_relative, None);
     }
 }

@@ -112,7 +112,7 @@ impl Session<'_> {
         let near_wall = is_said.then(|| self.near_wall_noted(observer)).flatten();
         let mut accuracy = Accuracy { facets, near_wall, ..Accuracy::default() };
         if !self.has_field_objective() {
-            return (accuracy.facets.is_some() || accuracy.near_wall.is_some()).then_some(accuracy);
+            return Some(accuracy).filter(Accuracy::says_something_of_the_geometry);
         }
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);

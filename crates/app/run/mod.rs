@@ -48,6 +48,7 @@ use crate::build::locate_error::attribute_error;
 use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
+use crate::exit_code::ExitCode;
 use crate::files::{
     CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements,
     RunDirectory, RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
@@ -288,7 +289,8 @@ impl Session<'_> {
         Ok(Concluded { result, directory: self.directory })
     }
 
-    /// Whether a run that ended with an error can be resumed, and there is something to go on from.
+    /// Whether a run that ended with an error can be resumed, and there is something to go on from: what fails in the first evaluation
+    /// fails in it again, on a refined mesh too.
     fn is_worth_resuming(&self, error: &Error) -> bool {
         let has_evaluations =
             || Journal::read_records(&self.directory).is_ok_and(|records| !records.is_empty());
@@ -296,7 +298,7 @@ impl Session<'_> {
             || Refinements::read(&self.directory).is_ok_and(|own| !own.refinements.is_empty());
         error.is_resumable()
             && self.directory.holds_configuration()
-            && (has_evaluations() || has_refinements())
+            && (has_evaluations() || error.exit_code() != ExitCode::Numerical && has_refinements())
     }
 
     fn write_configuration(&self) -> Result<(), Error> {

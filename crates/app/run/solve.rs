@@ -106,7 +106,18 @@ impl Session<'_> {
         exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
-        let estimate = analysis.objective.zip(estimate).filter(|_| self.has_field_objective());
+        let accuracy = estimate.and_then(|estimate| {
+            let known = Accuracy {
+                refinements: halvings as usize,
+                facets: self.facets_of(None, observer),
+                near_wall: self.near_wall_noted(observer),
+                ..Accuracy::default()
+            };
+            match analysis.objective.filter(|_| self.has_field_objective()) {
+                Some(value) => Some(known.of_analysis(value, estimate.objective)),
+                None => Some(known).filter(Accuracy::says_something_of_the_geometry),
+            }
+        });
         Ok(RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
@@ -119,12 +130,7 @@ impl Session<'_> {
                 homogeneity: homogeneity(problem, analysis, value),
                 terms: terms(problem, analysis),
             }),
-            accuracy: estimate.map(|(value, estimate)| Accuracy {
-                refinements: halvings as usize,
-                facets: self.facets_of(None, observer),
-                near_wall: self.near_wall_noted(observer),
-                ..Accuracy::of_analysis(value, estimate.objective)
-            }),
+            accuracy,
             constraints,
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         })

@@ -160,7 +160,7 @@ fn outline_of_run(
                 format!("the mesh of {origin} is another than that of the run: restore the file")
             }
             _ => format!(
-                "the mesh of the generator {origin} was made by version {} otherwise",
+                "the generator {origin} makes another mesh than that of the run, which version {} made",
                 manifest.version
             ),
         });

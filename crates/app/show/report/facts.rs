@@ -31,7 +31,7 @@ pub(super) fn mesh(data: &RunData) -> Markup {
     };
     let mut facts = Facts::default();
     if let Some(mesh) = &data.manifest.mesh {
-        facts.add("mesh with all regions", size(mesh.nodes, mesh.tets));
+        facts.add("mesh of the configuration", size(mesh.nodes, mesh.tets));
     }
     if let Some(result) = &data.result {
         let mesh = &result.mesh;
@@ -41,6 +41,9 @@ pub(super) fn mesh(data: &RunData) -> Markup {
         facts.add("worst quality", if data.is_run() { quality.join(" → ") } else { quality[1].clone() });
         facts.add("linear solver", result.linear_solver.methods.join(", "));
         facts.add("largest relative residual", number(result.linear_solver.worst_residual, 2));
+        if let Some(near_wall) = result.accuracy.as_ref().and_then(|accuracy| accuracy.near_wall.clone()) {
+            facts.add("nearest wall", near_wall);
+        }
     }
     let order = if u8::from(data.config.analysis.order) == 1 { "linear" } else { "quadratic" };
     let family = match data.config.analysis.elements {

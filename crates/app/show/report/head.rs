@@ -121,8 +121,7 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
         .facets
         .as_ref()
         .map(|facets| format!("facets up to {} mm off {}", number(1e3 * facets.off_m, 2), facets.surface));
-    let near_wall = accuracy.near_wall.clone();
-    let remark: Vec<String> = [bar, other, refined, facets, near_wall].into_iter().flatten().collect();
+    let remark: Vec<String> = [bar, other, refined, facets].into_iter().flatten().collect();
     Some(("gain", verdict.to_owned(), remark.join("; ")))
 }
 

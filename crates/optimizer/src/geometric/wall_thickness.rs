@@ -8,7 +8,7 @@
 //!
 //! the initial one plus the node's height where that face is held. A node without direction has no thickness.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
@@ -57,26 +57,31 @@ impl WallThickness {
     pub fn measure(mesh: &Mesh, bodies: &[RegionId], surface: &DesignSurface) -> Option<Self> {
         let of: BTreeMap<RegionId, BodyFaces> =
             bodies.iter().map(|&region| (region, BodyFaces::new(mesh, region, surface))).collect();
-        let mut body_at: HashMap<NodeId, RegionId> = HashMap::new();
+        let mut behind: HashMap<NodeId, BTreeSet<RegionId>> = HashMap::new();
         for (face, element) in faces_with_bodies(mesh, surface) {
             let region = mesh.topology().region_of()[element.index()];
             if of.contains_key(&region) {
                 face.iter().for_each(|&node| {
-                    body_at.entry(node).or_insert(region);
+                    behind.entry(node).or_default().insert(region);
                 });
             }
         }
-        // What moves along a side of the only body belongs to it.
-        let only = <[RegionId; 1]>::try_from(bodies).ok().map(|[region]| region);
         let opposite_of = |(&node, direction): (&NodeId, &Point)| {
             if *direction == [0.0; 3] {
                 return Some(None);
             }
-            let body = body_at.get(&node).copied().or(only)?;
-            let (faces, origin, back) = (&of[&body], mesh.point(node), direction.map(|d| -d));
-            // Of a body with two designed faces, the other one.
-            let found = faces.others.nearest(origin, back).or_else(|| faces.designed.nearest(origin, back));
-            found.map(|(distance, nodes)| Some(Opposite { distance, nodes, body }))
+            let (origin, back) = (mesh.point(node), direction.map(|d| -d));
+            let in_body = |body: RegionId| {
+                let faces = &of[&body];
+                // Of a body with two designed faces, the other one.
+                let found =
+                    faces.others.nearest(origin, back).or_else(|| faces.designed.nearest(origin, back));
+                found.map(|(distance, nodes)| Some(Opposite { distance, nodes, body }))
+            };
+            // A node with no body behind it moves along a side of one, or of the only one there is.
+            let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
+            let own = behind.get(&node).into_iter().flatten();
+            own.copied().chain(beside.map(|(region, _)| *region)).find_map(in_body)
         };
         let opposite =
             surface.nodes().iter().zip(surface.directions()).map(opposite_of).collect::<Option<Vec<_>>>()?;
@@ -189,6 +194,7 @@ pub fn faces_with_bodies(mesh: &Mesh, surface: &DesignSurface) -> Vec<([NodeId; 
 struct BodyFaces {
     designed: Faces,
     others: Faces,
+    designed_nodes: HashSet<NodeId>,
 }
 
 impl BodyFaces {
@@ -201,7 +207,12 @@ impl BodyFaces {
             .filter(|f| is_own(f.inside) != f.outside.is_some_and(is_own))
             .map(|f| f.nodes)
             .partition(|nodes| nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()));
-        Self { designed: Faces::new(mesh, designed), others: Faces::new(mesh, others) }
+        let designed_nodes = designed.iter().flatten().copied().collect();
+        Self { designed: Faces::new(mesh, designed), others: Faces::new(mesh, others), designed_nodes }
+    }
+
+    fn are_designed_at(&self, node: NodeId) -> bool {
+        self.designed_nodes.contains(&node)
     }
 }
 
@@ -295,7 +306,7 @@ mod tests {
         assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
     }
 
-    /// Layers between these heights with air below and above, and the lower face of each as the design, which moves along z.
+    /// Layers between these heights with air below and above, and the face of each that is ahead as the design, which moves along z.
     fn layers(heights: &[(&str, [f64; 2])], direction: f64) -> (Mesh, DesignSurface) {
         let layer = |(name, [from, to]): &(&str, [f64; 2])| BoxRegion {
             name: (*name).to_owned(),
