@@ -289,16 +289,13 @@ impl Session<'_> {
         Ok(Concluded { result, directory: self.directory })
     }
 
-    /// Whether a run that ended with an error can be resumed, and there is something to go on from: what fails in the first evaluation
-    /// fails in it again, on a refined mesh too.
+    /// Whether a run that ended with an error can be resumed: what fails in the first evaluation fails in it again.
     fn is_worth_resuming(&self, error: &Error) -> bool {
         let has_evaluations =
             || Journal::read_records(&self.directory).is_ok_and(|records| !records.is_empty());
-        let has_refinements =
-            || Refinements::read(&self.directory).is_ok_and(|own| !own.refinements.is_empty());
         error.is_resumable()
             && self.directory.holds_configuration()
-            && (has_evaluations() || error.exit_code() != ExitCode::Numerical && has_refinements())
+            && (error.exit_code() != ExitCode::Numerical || has_evaluations())
     }
 
     fn write_configuration(&self) -> Result<(), Error> {
