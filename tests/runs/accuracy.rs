@@ -66,14 +66,14 @@ fn the_field_of_a_lightest_device_is_what_is_checked() {
     let out = home.path().join("out");
     let said = finish(&mut shipped("shield_least_mass", &[]).command("run", &out)).completed().stderr;
     assert!(
-        said.contains("(estimated), satisfied") && !said.contains("gain  ") && !said.contains("error bar"),
+        said.contains("(estimated), satisfied") && !said.contains("gain  ") && !said.contains("error bar of"),
         "{said}"
     );
     let result = read_json(&out.join("result.json"));
     let accuracy = result["accuracy"].as_object().expect("the walls are near");
     let said: Vec<&str> =
         accuracy.iter().filter(|(_, value)| !value.is_null()).map(|(key, _)| key.as_str()).collect();
-    assert_eq!(said, ["near_wall", "refinements"]);
+    assert_eq!(said, ["refinements", "near_wall"]);
     assert!(result["constraints"][0]["error_estimate"].is_number());
     let [found, limited] = ["shield_least_mass", "shield_mass_limit"].map(|name| {
         let out = home.path().join(name);
