@@ -23,3 +23,4 @@ mod run_files;
 mod support;
 #[cfg(unix)]
 mod sweep;
+mod walls_and_images;

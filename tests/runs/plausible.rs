@@ -4,15 +4,15 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::support::folder::{RunFolder, list, number, read_json, read_text};
+use crate::support::folder::{RunFolder, list, number, read_text};
 use crate::support::program::{command, finish, folder};
+use crate::support::repository;
 use crate::support::shield::quick;
-use crate::support::{changed, repository};
 
 /// The quick shield with its plate meshed.
 const MESHED: [&str; 2] = ["regions.plate.model=volume", "remesh.region=[\"plate\", \"remesh\"]"];
 
-fn set<'a>(overrides: &[&'a str]) -> Vec<&'a str> {
+pub(super) fn set<'a>(overrides: &[&'a str]) -> Vec<&'a str> {
     overrides.iter().flat_map(|one| ["--set", *one]).collect()
 }
 
@@ -22,7 +22,7 @@ fn check(overrides: &[&str]) -> String {
     texts(&json["warnings"])
 }
 
-fn texts(warnings: &Value) -> String {
+pub(super) fn texts(warnings: &Value) -> String {
     let list = warnings.as_array().map(Vec::as_slice).unwrap_or_default();
     list.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("\n")
 }
@@ -492,52 +492,4 @@ fn degrees_without_their_unit_are_asked_about() {
     let said = "coils[0].phase is 14.3 turns: if degrees are meant";
     assert!(check(&["coils[0].phase=90"]).contains(said));
     assert!(!check(&["coils[0].phase=90 deg"]).contains("turns"));
-}
-
-/// The wall beside the coil is a wall, although an element that the coil meets reaches it.
-#[test]
-fn a_near_wall_is_named_with_the_error_that_no_bar_has() {
-    let wall = |half: &str| {
-        let half = format!("coils[0].half_window=[\"{half}\", \"60 mm\"]");
-        let checked =
-            finish(command(&[&"check", &quick(), &"--json"]).args(set(&[&half]))).exits_with(0).json();
-        (checked["truncation"]["surface"].clone(), number(&checked, "/truncation/distance_m"))
-    };
-    let (far, near) = (wall("60 mm"), wall("560 mm"));
-    println!("{far:?} {near:?}");
-    assert_eq!(near.0, "x_max");
-    assert!(near.1 < 0.05 && far.1 > 0.3);
-    let home = folder();
-    let near_wall = |name: &str, overrides: &[&str]| {
-        let out = home.path().join(name);
-        finish(command(&[&"solve", &quick(), &"--out", &out]).args(set(overrides))).exits_with(0);
-        read_json(&out.join("result.json"))["accuracy"]["near_wall"].clone()
-    };
-    let estimated = "accuracy.estimate=true";
-    let text = near_wall("walls", &[estimated]);
-    assert!(
-        text.as_str().is_some_and(|text| text.contains("no error bar counts what it cuts off")),
-        "{text}"
-    );
-    let conditions = "boundaries.flux_parallel=[\"x_min\", \"y_min\"]";
-    let open = "open.surfaces=[\"x_max\", \"y_max\", \"z_min\", \"z_max\"]";
-    assert_eq!(near_wall("open", &[estimated, conditions, open]), Value::Null);
-}
-
-/// Of a component that all planes of symmetry keep the mean is the device's; of another one only that of the meshed part. The pole's
-/// observation ends at two flux-parallel planes and at a flux-normal one, which keep the component along z.
-#[test]
-fn the_homogeneity_of_a_component_that_images_change_is_asked_about() {
-    let home = folder();
-    let pole = read_text(&repository("configs/pole.toml"));
-    let said = |direction: &str| {
-        let objective = format!("kind = \"homogeneity\"\ndirection = {direction}");
-        let target = "target = [0.0, 0.0, \"0.5 T\"]\n";
-        let text = changed(&pole, &[("kind = \"target_field\"", &objective), (target, "")]);
-        let path = home.path().join("pole.toml");
-        std::fs::write(&path, text).expect("written");
-        let json = finish(&mut command(&[&"check", &path, &"--json"])).exits_with(0).json();
-        texts(&json["warnings"]).contains("behind `x_min` the images of `observation` have another component")
-    };
-    assert!(said("[1, 0, 1]") && said("[1, 0, 0]") && !said("[0, 0, 1]"));
 }

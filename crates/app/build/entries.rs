@@ -1,8 +1,8 @@
-//! What the entries of a configuration mean to a field problem: the material of a region, and whether it is air.
+//! What the entries of a configuration mean to a field problem: the material of a region, and whether it is a magnet, a coil or air.
 
 use fluxmorph_solver::Material;
 
-use crate::config::{Config, Region, RegionModel};
+use crate::config::{Coil, CoilShape, Config, RegionModel};
 
 /// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron.
 const OF_A_CURVE: f64 = 1000.0;
@@ -16,8 +16,19 @@ pub(crate) fn material(config: &Config, region: &str) -> Material {
     })
 }
 
+/// Whether a region is a permanent magnet.
+pub(crate) fn is_magnet(config: &Config, region: &str) -> bool {
+    config.regions.get(region).is_some_and(|own| own.remanence.is_some())
+}
+
+/// Whether a region is a coil.
+pub(crate) fn is_wound(config: &Config, region: &str) -> bool {
+    let of = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == region);
+    config.coils.iter().any(of)
+}
+
 /// Whether a region is air to the field: of no other material, no magnet, and none that a surface stands for.
 pub(crate) fn is_air(config: &Config, region: &str) -> bool {
-    let acts = |own: &Region| own.remanence.is_some() || own.model != RegionModel::Volume;
-    material(config, region) == Material::AIR && !config.regions.get(region).is_some_and(acts)
+    let is_meshed = config.regions.get(region).is_none_or(|own| own.model == RegionModel::Volume);
+    material(config, region) == Material::AIR && !is_magnet(config, region) && is_meshed
 }

@@ -5,11 +5,11 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
 use fluxmorph_solver::coil;
 
-use super::entries::material;
+use super::entries::{is_magnet, is_wound, material};
 use super::plausible::{INCLINED, place_of_current, windings};
 use super::references::functionals;
 use super::soundness::faces_of;
-use crate::config::{Coil, CoilShape, Config, ForceBody, ObjectiveKind};
+use crate::config::{Config, ForceBody, ObjectiveKind};
 
 /// What is to be said of all bodies; `coils` are those of the configuration.
 pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
@@ -22,10 +22,8 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
     let topology = mesh.topology();
     let is_iron = |name: &str| material(config, name).relative_permeability != 1.0;
     let acts = |name: &String| {
-        let is_magnet = config.regions.get(name).is_some_and(|region| region.remanence.is_some());
-        let is_wound = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == *name);
         let conducts = config.alternates() && material(config, name).conductivity > 0.0;
-        is_iron(name) || is_magnet || conducts || config.coils.iter().any(is_wound)
+        is_iron(name) || is_magnet(config, name) || conducts || is_wound(config, name)
     };
     let (name, regions) = (&body.name, body.regions.join("`, `"));
     let is_own = |e: ElementId| body.regions.iter().any(|name| name == topology.region_name_at(e));
@@ -83,9 +81,7 @@ fn cut_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         };
         let cut = cut.map(|surface| format!("the surface `{surface}`")).or_else(natural);
         if let Some(surface) = cut {
-            let is_magnet =
-                |name: &String| config.regions.get(name).is_some_and(|own| own.remanence.is_some());
-            let of_magnet = if body.regions.iter().any(is_magnet) {
+            let of_magnet = if body.regions.iter().any(|name| is_magnet(config, name)) {
                 "; of a magnet it comes from the singular field beside the cut, and its error bar is far too small"
             } else {
                 ""

@@ -37,7 +37,7 @@ mod truncation;
 pub(crate) use design::triangulation as design_triangulation;
 pub(crate) use divided_mesh::DividedMesh;
 pub(crate) use elastic_body::{motion_in_words, stiffness_policy};
-pub(crate) use entries::{is_air, material};
+pub(crate) use entries::{is_air, is_wound, material};
 pub(crate) use field::{remaining_elements, remaining_nodes};
 pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};

@@ -1,4 +1,4 @@
-//! Whether coils can be meant as they stand in the mesh: sizes, places, units, materials.
+//! Whether coils, magnets and what is measured can be meant as they stand in the mesh: sizes, places, units, materials, images.
 //!
 //! What cannot be meant is refused at its key; what is rarely meant is a warning.
 
@@ -285,28 +285,48 @@ fn magnet_warnings(config: &Config, mesh: &Mesh, (name, remanence): (&str, Point
         ));
     }
     let Ok(region) = topology.region(name) else { return warnings };
+    warnings.extend(turning_surfaces(config, mesh, region, remanence).map(|Turning { surface, kind, part }| {
+        format!(
+            "the magnet `{name}` is cut by `{surface}`, a surface of {kind}, which mirrors the part of its remanence {part} the surface \
+             reversed"
+        )
+    }));
+    warnings
+}
+
+/// A surface at which the images of a vector are others.
+struct Turning<'a> {
+    surface: &'a String,
+    /// Its condition.
+    kind: &'static str,
+    /// Which part of the vector is reversed.
+    part: &'static str,
+}
+
+/// The first surface of either condition on which a region ends, and which mirrors a part of a vector there reversed, as it does of B.
+fn turning_surfaces<'a>(
+    config: &'a Config,
+    mesh: &'a Mesh,
+    region: RegionId,
+    vector: Point,
+) -> impl Iterator<Item = Turning<'a>> {
+    let topology = mesh.topology();
     let outer: HashSet<_> = topology.outer_faces(region).into_iter().map(face_key).collect();
     let boundaries = &config.boundaries;
-    let across = |share: f64| share > INCLINED;
-    let along = |share: f64| beside(share) > INCLINED;
-    let kinds: [(_, &dyn Fn(f64) -> bool, _, _); 2] = [
-        (&boundaries.flux_parallel, &across, "flux_parallel", "across"),
-        (&boundaries.flux_normal, &along, "flux_normal", "along"),
+    let across: fn(f64) -> bool = |share| share > INCLINED;
+    let along: fn(f64) -> bool = |share| beside(share) > INCLINED;
+    let kinds = [
+        (&boundaries.flux_parallel, across, "flux_parallel", "across"),
+        (&boundaries.flux_normal, along, "flux_normal", "along"),
     ];
-    for (walls, is_reversed, kind, part) in kinds {
-        let cuts = |wall: &&String| {
-            let faces = faces_of(topology, [wall.as_str()]);
+    kinds.into_iter().filter_map(move |(surfaces, is_reversed, kind, part)| {
+        let turns = |surface: &&String| {
+            let faces = faces_of(topology, [surface.as_str()]);
             let mut own = faces.intersection(&outer);
-            own.any(|face| is_reversed(dot(normal(mesh, *face), remanence).abs() / size))
+            own.any(|face| is_reversed(dot(normal(mesh, *face), vector).abs() / norm(vector)))
         };
-        warnings.extend(walls.iter().find(cuts).map(|wall| {
-            format!(
-                "the magnet `{name}` is cut by `{wall}`, a surface of {kind}, which mirrors the part of its remanence {part} the surface \
-                 reversed"
-            )
-        }));
-    }
-    warnings
+        surfaces.iter().find(turns).map(|surface| Turning { surface, kind, part })
+    })
 }
 
 /// What a unit vector with this part across a surface has along it.
@@ -322,27 +342,14 @@ pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
 
 /// What to say of the homogeneity of a component that is another one in the images of its region: the mean is not the device's.
 fn component_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
-    let topology = mesh.topology();
-    let conditions = &config.boundaries;
-    let planes = conditions.flux_parallel.iter().map(|name| (name, true));
-    let planes: Vec<(&String, bool)> =
-        planes.chain(conditions.flux_normal.iter().map(|name| (name, false))).collect();
     let of = |(path, own): (String, &Functional)| {
         let is_component = own.kind == ObjectiveKind::Homogeneity
             && own.compare.is_none_or(|compared| compared == Compared::Component);
         let (direction, name) = (own.direction.filter(|_| is_component)?, own.region.as_ref()?);
-        let faces = topology.outer_faces(topology.region(name).ok()?);
-        let turns = |face: &[NodeId; 3], keeps_along: bool| {
-            let across = dot(normal(mesh, *face), direction).abs() / norm(direction);
-            if keeps_along { across > INCLINED } else { beside(across) > INCLINED }
-        };
-        let is_turned = |(plane, keeps_along): &&(&String, bool)| {
-            let own = faces_of(topology, [plane.as_str()]);
-            faces.iter().any(|face| own.contains(&face_key(*face)) && turns(face, *keeps_along))
-        };
-        let (plane, _) = planes.iter().find(is_turned)?;
+        let region = mesh.topology().region(name).ok()?;
+        let Turning { surface, .. } = turning_surfaces(config, mesh, region, direction).next()?;
         Some(format!(
-            "{path}: behind `{plane}` the images of `{name}` have another component along this direction, and what is computed is the \
+            "{path}: behind `{surface}` the images of `{name}` have another component along this direction, and what is computed is the \
              deviation of the meshed part from its own mean, which is not that of the whole device; take a direction that the plane \
              keeps, or mesh all of `{name}`"
         ))

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, Millimetres, NodeId, millimetres};
 
-use crate::build::{functionals, is_air};
-use crate::config::{Coil, CoilShape, Config};
+use crate::build::{functionals, is_air, is_wound};
+use crate::config::Config;
 use crate::files::CurvedFacets;
 
 /// Cosine of the largest angle, 35°, at which two facets are taken for one curved surface: a ball with eight of them along a half
@@ -89,9 +89,8 @@ pub(super) fn curved_facets(mesh: &Mesh, empty: impl Fn(&str) -> bool) -> Option
 
 /// Whether a region is air in which nothing flows and nothing is measured.
 pub(super) fn is_empty(config: &Config, name: &str) -> bool {
-    let is_wound = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == name);
     is_air(config, name)
-        && !config.coils.iter().any(is_wound)
+        && !is_wound(config, name)
         && !config.forces.iter().any(|body| body.regions.iter().any(|own| own == name))
         && !functionals(config).iter().any(|(_, own)| own.region.as_deref() == Some(name))
 }

@@ -104,7 +104,8 @@ pub(crate) fn run_held(
     observer: &mut dyn RunObserver,
 ) -> Result<Concluded, Error> {
     let prepared = Prepared::new(config, source, Mode::Optimisation, options, observer)?;
-    let session = prepared.begin("run", observer)?;
+    let mesh = prepared.mesh_hash();
+    let session = prepared.begin("run", mesh, observer)?;
     session.conclude(observer, |session, observer| {
         let journal = Journal::create(&session.directory, session.identity())?;
         let recorder = DirectoryRecorder::new(session, journal, Vec::new())?;

@@ -21,8 +21,6 @@ pub(super) struct Prepared<'a> {
     /// Of the mesh before it is refined.
     facets: Option<CurvedFacets>,
     near_wall: Option<String>,
-    /// Of the mesh of the configuration, before it is cut.
-    mesh: MeshHash,
     options: Options<'a>,
     clock: Instant,
 }
@@ -44,21 +42,26 @@ impl<'a> Prepared<'a> {
         OptimizerError::check_interrupted(options.interrupted)?;
         let facets = curved_facets(&setup.full_mesh, |name| is_empty(config, name));
         let near_wall = Truncation::of(&setup).and_then(|truncation| truncation.described());
-        let mesh = mesh_hash(config, &setup.full_mesh);
-        Ok(Self { setup, config, source, facets, near_wall, mesh, options, clock })
+        Ok(Self { setup, config, source, facets, near_wall, options, clock })
     }
 
-    /// Takes the output directory, and writes the manifest.
+    /// Origin and hash of its mesh.
+    pub(super) fn mesh_hash(&self) -> MeshHash {
+        mesh_hash(self.config, &self.setup.full_mesh)
+    }
+
+    /// Takes the output directory, and writes the manifest with the hash of the `mesh` of the configuration.
     pub(super) fn begin(
         self,
         command: &'static str,
+        mesh: MeshHash,
         observer: &mut dyn RunObserver,
     ) -> Result<Session<'a>, Error> {
-        let Self { config, source, options, ref mesh, .. } = self;
+        let Self { config, source, options, .. } = self;
         let directory =
             RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
         let mut manifest = Manifest::new(command, options.threads).reading(source);
-        manifest.mesh = Some(mesh.clone());
+        manifest.mesh = Some(mesh);
         manifest.tables = table_hashes(&self.setup.tables);
         manifest.ranks = options.ranks.map(RankGroup::size);
         manifest.surfaces = surface_files(&config.output.stl);
@@ -76,7 +79,7 @@ impl<'a> Prepared<'a> {
         directory: RunDirectory,
         manifest: Manifest,
     ) -> Session<'a> {
-        let Self { setup, config, source, facets, near_wall, options, clock, .. } = self;
+        let Self { setup, config, source, facets, near_wall, options, clock } = self;
         let setup_seconds = clock.elapsed().as_secs_f64();
         Session {
             command,

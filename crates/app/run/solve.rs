@@ -38,6 +38,8 @@ pub fn solve(
     let initial = problem.shape().filter(|_| problem.has_shared_bounds()).map(|shape| shape.initial());
     let initial = initial.filter(|&initial| initial != p);
     let mut initial = initial.map(|initial| problem.moved(initial)).transpose()?;
+    // Before it is cut.
+    let mesh = prepared.mesh_hash();
     let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p));
     if halvings > 0 {
         let cut = Cut::Halvings(halvings);
@@ -47,7 +49,7 @@ pub fn solve(
         prepared.setup = finer.setup;
         memory_limit::check_problem(&prepared.setup.problem, source, options.overwrite_policy)?;
     }
-    let session = prepared.begin("solve", observer)?;
+    let session = prepared.begin("solve", mesh, observer)?;
     let concluded = session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;
         observer.phase("solving the field");

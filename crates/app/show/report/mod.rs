@@ -68,8 +68,8 @@ impl ReportedRun {
     /// Reads manifest and configuration of the directory of a `run` or a `solve`.
     ///
     /// # Errors
-    /// [`Error::NoReport`] for what another command has written and for a configuration that has become another, faults of the configuration, files that are damaged or
-    /// cannot be read.
+    /// [`Error::NoReport`] for what another command has written and for a configuration that has become another, faults of the
+    /// configuration, files that are damaged or cannot be read.
     pub fn open(disk: &Arc<dyn Disk>, path: &Path) -> Result<Self, Error> {
         Self::of(RunDirectory::open(disk, path)?)
     }
