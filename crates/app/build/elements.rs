@@ -83,7 +83,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Vec<
 fn filled_iron<'a>(config: &'a Config, audits: &'a [Audited]) -> impl Iterator<Item = String> + 'a {
     let order = u8::from(config.analysis.order);
     let most = FILLED_IRON[usize::from(order) - 1];
-    let of = nodal_conductors(config, audits).filter(move |(Audited { audit, model }, errors)| {
+    let of = nodal_conductors(config, audits).filter(move |(Audited { audit, model, .. }, errors)| {
         let drawn_in = audit.carrying_permeability() * (1.0 - 1.0 / audit.relative_permeability);
         *model == RegionModel::Volume && errors.is_filled && drawn_in > most
     });
@@ -128,7 +128,7 @@ fn nodal_conductors<'a>(
 }
 
 /// What nodal elements make of a conductor.
-fn coarse(config: &Config, Audited { audit, model }: &Audited, errors: &NodalErrors) -> String {
+fn coarse(config: &Config, Audited { audit, model, .. }: &Audited, errors: &NodalErrors) -> String {
     let [place, beside] = match model {
         RegionModel::Impedance => ["and on its impedance surface", ", though the field is not"],
         RegionModel::Volume | RegionModel::Perfect => ["in which", ""],

@@ -45,8 +45,8 @@ pub use names::with_names;
 pub use outline::{Outline, OutlinedDesign, outline};
 pub(crate) use references::functionals;
 pub(crate) use refined::RefinedMesh;
-pub use skin::Audited;
-pub(crate) use skin::{least_thickness, result_warnings};
+pub use skin::{Audited, SkinOf};
+pub(crate) use skin::{audited_in_field, least_thickness, result_warnings, warnings as skin_warnings};
 pub(crate) use truncation::Truncation;
 
 use std::collections::BTreeMap;
@@ -159,8 +159,11 @@ fn problem_on(
 ) -> Result<Setup, Error> {
     let motion_alone = mode == Mode::Inspection && config.morph.is_some();
     let open_patches = look_at_mesh(config, source, &full_mesh, motion_alone, &mut warnings)?;
-    let audits = audits(config, &full_mesh);
-    warnings.extend(audits.iter().filter_map(Audited::warning));
+    let curves = Curves::read(config, source);
+    let audits = audits(config, &full_mesh, curves.as_ref().unwrap_or(&Curves::default()));
+    // Where a field will be known, it says what the skin of iron with a B–H curve is.
+    let is_known = |own: &&Audited| mode == Mode::Inspection || own.skin_of == SkinOf::Material;
+    warnings.extend(skin::warnings(audits.iter().filter(is_known)));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
     let mut faults = probes::faults(config, source, &full_mesh, &mesh);
     faults.extend(field::contact_faults(config, source, &mesh, &conductors));
@@ -172,7 +175,7 @@ fn problem_on(
     progress.stage(Stage::Unknowns);
     let share = group.map(|group| share::of_mesh(config, &mesh, group)).transpose()?;
     let coils = sink.take(field::coils(config, source, &mesh))?;
-    let curves = sink.take(Curves::read(config, source))?.unwrap_or_default();
+    let curves = sink.take(curves)?.unwrap_or_default();
     warnings.extend(curves.warnings(config));
     if !motion_alone {
         let coils = coils.as_deref().unwrap_or_default();

@@ -10,6 +10,7 @@ use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_remesh::{KinematicConstraint, MotionLaw};
 
 use super::RefinedMesh;
+use super::curves::Curves;
 use super::elastic_body::{regions_at, remesh_setup};
 use super::names::name_faults;
 use super::shape::thickened_regions;
@@ -74,7 +75,7 @@ pub fn outline(
         Some(_) => Some(outline_design((config, source), carried, &full_mesh, &mesh, &node_of)?),
         None => None,
     };
-    let audits = audits(config, &full_mesh);
+    let audits = audits(config, &full_mesh, &Curves::read(config, source)?);
     Ok(Outline { full_mesh, mesh, node_of, audits, design })
 }
 

@@ -6,13 +6,15 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
-use fluxmorph_geometry::{ElementId, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
-use crate::build::{Setup, least_thickness, material, result_warnings};
+use crate::build::{
+    Audited, Setup, audited_in_field, least_thickness, material, result_warnings, skin_warnings,
+};
 use crate::config::{Config, Goal, RegionModel};
 use crate::files::ObjectiveResult;
 
@@ -49,6 +51,7 @@ impl Saturated {
 pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<String> {
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
+    all.extend(skin_warnings(&skins_of_curves(config, problem, analysis)));
     let least = problem
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
@@ -92,6 +95,53 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
             })
         })
         .collect()
+}
+
+/// Skin audits of iron with a B–H curve, of the permeability that the fields leave at its surface.
+fn skins_of_curves(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<Audited> {
+    let mesh = &analysis.mesh;
+    let names = mesh.topology().region_names();
+    let states = problem.states().iter().zip(&analysis.solutions);
+    let alternating = states.filter(|(model, _)| model.setup().frequency > 0.0);
+    let of = |(model, solution): (&FieldModel, &FieldSolution)| {
+        let audited = |name: &String| {
+            let permeability = median_permeability(model, solution, mesh, name)?;
+            audited_in_field((config, mesh), name, permeability, model.setup().frequency)
+        };
+        names.iter().filter_map(audited).collect::<Vec<_>>()
+    };
+    alternating.flat_map(of).collect()
+}
+
+/// The median, by area, of the relative permeability at the surface of a region with a B–H curve.
+fn median_permeability(model: &FieldModel, solution: &FieldSolution, mesh: &Mesh, name: &str) -> Option<f64> {
+    let topology = mesh.topology();
+    let region = topology.region(name).ok()?;
+    let (elements, areas): (Vec<ElementId>, Vec<f64>) = topology
+        .facets()
+        .iter()
+        .filter_map(|facet| {
+            let sides = [facet.inside, facet.outside?];
+            let own = sides.map(|e| topology.region_of()[e.index()] == region);
+            let area = norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
+            (own[0] != own[1]).then(|| (sides[usize::from(own[1])], area))
+        })
+        .unzip();
+    let curve = model.curve_of(*elements.first()?)?;
+    let permeability = |b: f64| match curve.at(b).field_strength {
+        h if h > 0.0 => b / (VACUUM_PERMEABILITY * h),
+        _ => curve.largest_permeability(),
+    };
+    let fields = solution.flux_densities_of(model, mesh, &elements);
+    let mut at: Vec<(f64, f64)> = fields.into_iter().map(|b| permeability(peak(b))).zip(areas).collect();
+    at.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * at.iter().map(|own| own.1).sum::<f64>();
+    let mut below = 0.0;
+    let is_in_the_middle = |own: &&(f64, f64)| {
+        below += own.1;
+        below >= half
+    };
+    at.iter().find(is_in_the_middle).map(|own| own.0)
 }
 
 /// Iron beyond saturation, by region.

@@ -123,7 +123,7 @@ impl Motion {
         {
             return Ok(Carried { share: 1.0, moved, room: room.clone(), asked: Some(asked.clone()) });
         }
-        let (share, moved) = self.longest_part(law, path, asked.clone())?;
+        let (share, moved) = self.longest_part(law, path)?;
         let room = match (room, &moved.tangent) {
             (None, Some(tangent)) => {
                 let near = room_of(law, &moved.displacement, tangent)?;
@@ -134,29 +134,23 @@ impl Motion {
         Ok(Carried { share, moved, room, asked })
     }
 
-    /// The longest part of a path that is carried, and the mesh there; `near` is an equilibrium near the path.
+    /// The longest part of a path that is carried, and the mesh there.
     fn longest_part(
         &self,
         law: &dyn EnergyLaw,
         path: &dyn Fn(f64) -> Vec<Point>,
-        mut near: Option<Equilibrium>,
     ) -> Result<(f64, Moved), RemeshError> {
+        let first = law.equilibrium(&path(0.0))?;
         let (mut low, mut high, mut best) = (0.0, 1.0, None);
-        if near.is_none() {
-            near = settled(law.equilibrium(&path(0.0)))?;
-        }
+        // Of a law with several equilibria those near a tangled one are tangled too: what is carried leads to what is.
+        let mut near = first.clone();
         for _ in 0..SHARE_BITS {
             let middle = 0.5 * (low + high);
-            let design = path(middle);
-            let own = match &near {
-                Some(near) => settled(law.near(near, &design))?,
-                None => settled(law.equilibrium(&design))?,
-            };
-            match self.roomy(law, own.clone())? {
-                Some(moved) => (low, best) = (middle, Some(moved)),
-                None => high = middle,
+            let own = settled(law.near(&near, &path(middle)))?;
+            match (self.roomy(law, own.clone())?, own) {
+                (Some(moved), Some(own)) => (low, best, near) = (middle, Some(moved), own),
+                _ => high = middle,
             }
-            near = own.or(near);
         }
         // The mesh of a design is that which is found from nothing else.
         let is_final = law.has_one_equilibrium();
@@ -168,7 +162,7 @@ impl Motion {
             }
             low = if low > SHORTEST_PART { 0.5 * low } else { 0.0 };
         }
-        Ok((0.0, self.at(law.equilibrium(&path(0.0))?)?))
+        Ok((0.0, self.at(first)?))
     }
 
     /// The mesh of an equilibrium, where there is one and it has the least room.

@@ -18,7 +18,7 @@ use super::advice::advice;
 use super::estimate::EstimateSummary;
 use super::reach::Reach;
 use crate::build::{
-    Audited, Mode, Setup, Truncation, memory_limit, motion_in_words, set_up_watched, stiffness_policy,
+    Audited, Mode, Setup, SkinOf, Truncation, memory_limit, motion_in_words, set_up_watched, stiffness_policy,
 };
 use crate::config::{
     self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, Material, MeshConfig, Objective,
@@ -154,6 +154,9 @@ pub(super) struct SkinSummary {
     pub(super) region: String,
     pub(super) model: &'static str,
     pub(super) skin_depth_m: f64,
+    /// Of iron with a B–H curve: the depth is that of its largest permeability, this one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) largest_permeability: Option<f64>,
     pub(super) median_elements_per_skin_depth: f64,
     pub(super) least_elements_per_skin_depth: f64,
     pub(super) thickness_in_skin_depths: f64,
@@ -166,6 +169,8 @@ impl SkinSummary {
             region: audit.region.clone(),
             model: audited.model.name(),
             skin_depth_m: audit.skin_depth,
+            largest_permeability: (audited.skin_of == SkinOf::LargestOfCurve)
+                .then_some(audit.relative_permeability),
             median_elements_per_skin_depth: audit.median_elements_per_skin_depth,
             least_elements_per_skin_depth: audit.least_elements_per_skin_depth,
             thickness_in_skin_depths: audit.thickness_in_skin_depths,

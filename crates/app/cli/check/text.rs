@@ -363,7 +363,8 @@ fn skin_table(summary: &Summary<'_>) -> Table<5> {
         } else {
             "none inside".to_owned()
         };
-        let depth = format!("{:.3}", Millimetres(s.skin_depth_m));
+        let unsaturated = if s.largest_permeability.is_some() { " unsaturated" } else { "" };
+        let depth = format!("{:.3}{unsaturated}", Millimetres(s.skin_depth_m));
         let thickness = format!("{:.1}", s.thickness_in_skin_depths);
         table.row([s.region.clone(), s.model.to_owned(), depth, elements, thickness]);
     }
