@@ -19,6 +19,7 @@ mod plausible;
 mod pyvista;
 mod ranks;
 mod run_files;
+mod skins;
 #[path = "../support/mod.rs"]
 mod support;
 #[cfg(unix)]

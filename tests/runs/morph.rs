@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::support::device::MOTION as BLOCK;
 use crate::support::folder::{count, files_below, number, read_json, read_text, scalars, vectors};
-use crate::support::program::{Finished, command, finish, fluxmorph, folder};
+use crate::support::program::{Finished, command, finish, fluxmorph, fluxmorph_in, folder};
 use crate::support::repository;
 
 /// Pressed in by three quarters of the height: no linear map survives that.
@@ -95,6 +95,25 @@ fn a_motion_that_stops_short_on_a_valid_mesh_has_stopped_and_not_failed() {
     let least = "[morph]\nleast_quality = 0.3\n[[morph.motion]]";
     let case = stopped(&BLOCK.replace("\"5 mm\"", "\"-12 mm\"").replace("[[morph.motion]]", least));
     assert!(number(&case, "/after/worst") < 0.3 && number(&case, "/reached") == 1.0);
+}
+
+/// Beyond what is carried the nodes come to rest in tangles, which those of shorter motions must not be found from.
+#[test]
+fn a_hyperelastic_motion_goes_as_far_wherever_it_is_to_end() {
+    let home = folder();
+    fluxmorph_in(home.path(), &["init", "gmsh"]).exits_with(0);
+    let reached = [6.0, 8.0, 12.0].map(|end| {
+        let upper = format!("design.upper=\"{end} mm\"");
+        let keys = ["remesh.law=hyperelastic", &upper, "morph.motion=[{ design = \"upper\" }]"];
+        let overrides = keys.iter().flat_map(|key| ["--set", *key]);
+        let arguments = ["morph", "gmsh.toml", "--json", "--force"].into_iter().chain(overrides);
+        let finished = fluxmorph_in(home.path(), &arguments.collect::<Vec<_>>()).exits_with(1);
+        end * number(&finished.json()["cases"][0], "/reached")
+    });
+    // A share is found by seven halves.
+    for (own, end) in reached.into_iter().zip([6.0, 8.0, 12.0]) {
+        assert!(own > 5.0 && (own - reached[0]).abs() < end / 64.0, "{reached:?}");
+    }
 }
 
 #[test]

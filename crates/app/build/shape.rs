@@ -6,7 +6,7 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{Point, add, centroid, dot, norm};
 use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, millimetres};
-use fluxmorph_optimizer::design::DesignSurface;
+use fluxmorph_optimizer::design::{DesignSurface, cell_size};
 use fluxmorph_optimizer::geometric::{WallThickness, faces_with_bodies};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup, Subregion};
@@ -61,16 +61,9 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         None => super::design::surface(config, source, design, full_mesh)?,
     };
     let surface = super::design::on_remaining(source, &full_surface, full_mesh, mesh)?;
-    let mut weights = vec![0.0; surface.variable_count()];
-    surface.rows().iter().flatten().for_each(|&(k, weight)| weights[k] += weight);
-    let idle = weights.iter().filter(|&&weight| weight == 0.0).count();
-    if idle > 0 {
-        warnings.push(format!(
-            "{idle} of {} design variables move no node: the control grid is finer than the mesh, or lies on a fixed rim; \
-             refine the mesh, or take a smaller design.grid",
-            surface.variable_count()
-        ));
-    }
+    let cell = cell_size(full_mesh, &super::design::triangles(design, full_mesh)?);
+    warnings.extend(fine_grid_warning(&surface, cell));
+    warnings.extend(idle_warning(&surface));
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
     warnings.extend(held_warning(inputs.remesh, mesh, &surface));
     warnings.extend(slid_warning(inputs.remesh, design));
@@ -82,6 +75,38 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
     Ok(Body { full_surface, surface, motion })
+}
+
+/// Distance of the points of a control grid in cells of the surface below which the mesh does not follow them.
+const FINEST_GRID: f64 = 0.5;
+
+/// A control grid of which the mesh cannot follow the variables one by one.
+fn fine_grid_warning(surface: &DesignSurface, cell: f64) -> Option<String> {
+    let sides = surface.grid_sides()?;
+    let side = sides.iter().find(|side| side.spacing() < FINEST_GRID * cell)?;
+    let most = ((side.extent / cell) as usize + 1).max(2);
+    Some(format!(
+        "design.grid has a point every {:.3} mm along {}, and cells of the surface are {:.3} mm wide: the mesh does not follow them one \
+         by one, and what they gain may be lost on another mesh; take up to {most} points along {}, or refine the mesh",
+        Millimetres(side.spacing()),
+        side.axis,
+        Millimetres(cell),
+        side.axis
+    ))
+}
+
+/// Points of a control grid that move nothing.
+fn idle_warning(surface: &DesignSurface) -> Option<String> {
+    let mut weights = vec![0.0; surface.variable_count()];
+    surface.rows().iter().flatten().for_each(|&(k, weight)| weights[k] += weight);
+    let idle = weights.iter().filter(|&&weight| weight == 0.0).count();
+    (idle > 0).then(|| {
+        format!(
+            "{idle} of {} design variables move no node: these points of design.grid lie beside the surface in the rectangle around \
+             it, between its nodes or on a fixed rim, and change nothing",
+            surface.variable_count()
+        )
+    })
 }
 
 /// What is rarely meant by a design surface with the same on both sides, or with nothing on one.

@@ -53,8 +53,8 @@ impl Audited {
             }),
             (RegionModel::Volume, SkinOf::Field) => coarse.map(|text| {
                 format!(
-                    "{}. Refine the skin: the depth is that of the permeability which the field leaves at the surface, \
-                     {permeability:.0} in the middle",
+                    "{}. Refine the skin: the depth is that of the median permeability that the field leaves at its surface, \
+                     {permeability:.0}",
                     finding(&text)
                 )
             }),

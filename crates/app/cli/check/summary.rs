@@ -9,6 +9,7 @@ use fluxmorph_geometry::tet4::{area_vector, norm, volume};
 use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::{self, Quantity};
+use fluxmorph_optimizer::design::GridSide;
 use fluxmorph_optimizer::problem::{Problem, Progress, Shape};
 use fluxmorph_remesh::MotionLaw;
 use fluxmorph_solver::FieldModel;
@@ -50,6 +51,9 @@ pub(super) struct Summary<'a> {
     pub(super) design_variables: usize,
     /// Radius of the filter of the design [m].
     pub(super) filter_radius_m: Option<f64>,
+    /// The sides of the control grid.
+    #[serde(skip)]
+    pub(super) grid_sides: Option<[GridSide; 2]>,
     /// How the mesh follows the design, and why so.
     pub(super) mesh_motion: Option<String>,
     /// How stiffness follows element size.
@@ -220,6 +224,7 @@ pub(super) fn summary<'a>(
         elastic_equations: problem.shape().map_or(0, |shape| shape.motion().map().equation_count()),
         design_variables: problem.shape().map_or(0, |shape| shape.surface().variable_count()),
         filter_radius_m: problem.shape().and_then(|shape| shape.surface().filter_radius()),
+        grid_sides: problem.shape().and_then(|shape| shape.surface().grid_sides()),
         mesh_motion: moves.map(|(remesh, shape)| motion_in_words(remesh, shape.motion())),
         stiffness: config.remesh.as_ref().map(|remesh| stiffness(remesh, problem.shape())),
         bounding_box_m: mesh.bounding_box(),

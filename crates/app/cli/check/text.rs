@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use fluxmorph_geometry::Millimetres;
+use fluxmorph_optimizer::design::GridSide;
 
 use super::estimate::{ConstraintError, EstimateSummary};
 use super::reach::Reach;
@@ -169,7 +170,11 @@ fn objective(summary: &Summary<'_>) -> String {
 
 fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     if let Some(design) = summary.design {
-        let grid = design.grid.map(|[n, m]| format!(", grid {n} x {m}")).unwrap_or_default();
+        let side = |side: GridSide| format!("{} along {}", side.count, side.axis);
+        let grid = summary
+            .grid_sides
+            .map(|sides| format!(", grid {}", sides.map(side).join(", ")))
+            .unwrap_or_default();
         let filter =
             summary.filter_radius_m.map(|radius| format!(", filtered over {} mm", millimetre(radius)));
         let (surfaces, smoothed) = (design.surface.join(", "), filter.unwrap_or(grid));

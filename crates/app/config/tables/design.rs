@@ -42,9 +42,10 @@ table! {
         surface: Vec<String> = NAME_OR_NAMES, need "\"plate_bottom\"";
         /// Direction of a positive displacement: a vector, whose length does not matter, or `"normal"`.
         direction: DesignDirection = ONE_OF, need "[0.0, 0.0, -1.0], or direction = \"normal\"";
-        /// Points of the control grid along the two coordinates of the surface, bilinear in between; the first is slow in the
-        /// order of the variables. With `direction = "normal"` the grid lies across the axis that the normals follow most, and
-        /// the surface must not turn back over it. Default: every node of the surface is a variable.
+        /// Points of the control grid along the two coordinates of the surface, bilinear in between: x and y where it moves along
+        /// z, x and z along y, y and z along x. The first is slow in the order of the variables. With `direction = "normal"` the
+        /// grid lies across the axis that the normals follow most, and the surface must not turn back over it. Default: every node
+        /// of the surface is a variable.
         grid: Option<[usize; 2]> = integer(2, 300);
         /// The displacement of a node is the mean of the variables at the nodes around it, with the weight (1 − distance /
         /// radius) × area: shapes stay smooth, and the same on a finer mesh. Two to four sizes of a cell are a good start. 0: a

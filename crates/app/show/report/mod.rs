@@ -86,7 +86,7 @@ impl ReportedRun {
         }
         if !directory.holds_configuration() {
             return Err(refused(
-                "it was interrupted before its configuration was saved; start it again".into(),
+                "config.toml is gone, or the run was cut before it was saved: restore it, or start the run again".into(),
             ));
         }
         let (config, source) = run::configuration(&directory, &manifest)?;

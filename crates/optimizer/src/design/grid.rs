@@ -20,6 +20,24 @@ pub fn dominant_axis(vector: Point) -> usize {
     (0..3).fold(0, |best, d| if vector[d].abs() > vector[best].abs() { d } else { best })
 }
 
+/// One side of a control grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridSide {
+    /// The coordinate along which its points lie: `'x'`, `'y'` or `'z'`.
+    pub axis: char,
+    /// Number of points.
+    pub count: usize,
+    /// From the first to the last [m].
+    pub extent: f64,
+}
+
+impl GridSide {
+    /// From one point to the next [m].
+    pub fn spacing(&self) -> f64 {
+        self.extent / (self.count - 1) as f64
+    }
+}
+
 /// A regular grid over two coordinates.
 pub(super) struct Grid {
     along: usize,
@@ -65,6 +83,14 @@ impl Grid {
             }
         }
         Ok(Self { along, across, counts, limits })
+    }
+
+    /// Both sides, the slow one in the order of the points first.
+    pub(super) fn sides(&self) -> [GridSide; 2] {
+        [0, 1].map(|side| {
+            let (low, high) = self.limits[side];
+            GridSide { axis: axis_name(self.across[side]), count: self.counts[side], extent: high - low }
+        })
     }
 
     /// Weights of the grid's points at a place.

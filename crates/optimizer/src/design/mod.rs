@@ -22,7 +22,7 @@ use fluxmorph_geometry::tet4::{Point, dot};
 use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 pub use filter::{cell_size, default_filter_radius};
-pub use grid::dominant_axis;
+pub use grid::{GridSide, dominant_axis};
 pub use transfer::{SurfaceMismatch, Triangulation};
 
 /// Weights of the variables at one node, ascending by variable.
@@ -181,6 +181,7 @@ pub struct DesignSurface {
     rows: Vec<Row>,
     points: Vec<Point>,
     filter_radius: Option<f64>,
+    grid_sides: Option<[GridSide; 2]>,
 }
 
 impl DesignSurface {
@@ -210,6 +211,7 @@ impl DesignSurface {
         }
         let edges = boundary_edges::BoundaryEdges::new(&setup.triangles, &setup.cuts);
 
+        let mut grid_sides = None;
         let (mut rows, mut points, groups) = match setup.control {
             Control::Nodes => {
                 let rows = (0..nodes.len()).map(|i| vec![(i, 1.0)]).collect();
@@ -226,6 +228,7 @@ impl DesignSurface {
                 let points = grid.points(&places);
                 let pairs = symmetry::pairs("control point", &grid.flat(&points), &setup.mirrors)?;
                 let groups = symmetry::groups(points.len(), &pairs);
+                grid_sides = Some(grid.sides());
                 (places.iter().map(|&x| grid.row(x)).collect(), points, groups)
             }
         };
@@ -240,7 +243,7 @@ impl DesignSurface {
             Control::Filter(radius) => Some(radius),
             Control::Nodes | Control::Grid(_) => None,
         };
-        let mut surface = Self { nodes, directions, rows, points, filter_radius };
+        let mut surface = Self { nodes, directions, rows, points, filter_radius, grid_sides };
         if on_nodes {
             surface.drop_idle();
         }
@@ -296,6 +299,11 @@ impl DesignSurface {
     /// Radius of the filter [m], where there is one.
     pub fn filter_radius(&self) -> Option<f64> {
         self.filter_radius
+    }
+
+    /// The sides of the control grid, where there is one; the first is slow in the order of the variables.
+    pub fn grid_sides(&self) -> Option<[GridSide; 2]> {
+        self.grid_sides
     }
 
     /// Where the variables sit on the undeformed surface [m], shape `(n_variables, 3)`.
