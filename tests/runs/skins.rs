@@ -24,7 +24,7 @@ fn check(overrides: &[&str]) -> Value {
 }
 
 #[test]
-fn the_skin_of_iron_with_a_curve_is_that_of_its_own_permeability() {
+fn the_permeability_of_iron_with_a_curve_is_that_of_its_own_permeability() {
     let depth = |summary: &Value| number(summary, "/skin/0/skin_depth_m");
     let (linear, curve) = (check(&IRON), check(&[&IRON[..], &[SATURATING]].concat()));
     assert_eq!(depth(&linear), depth(&curve));
@@ -50,7 +50,7 @@ fn an_analysis_says_what_its_field_leaves_of_the_permeability() {
         // What is only supposed before the field is known is not said beside it.
         assert!(!found.contains("the largest permeability of the B–H curve"), "{found}");
         let (_, after) = found.split_once("leaves at its surface, ").expect("the skin is coarse");
-        let word = after.split_whitespace().next().expect("a number");
+        let word = after.split([' ', ',']).next().expect("a number");
         word.parse::<f64>().expect("a permeability")
     };
     assert_eq!(left("1 A"), 8000.0);

@@ -206,7 +206,9 @@ fn strongest_iron<'a>(config: &Config, mesh: &'a Mesh, audits: &[Audited]) -> Op
             relative_permeability
         } else {
             let own = meshed(audits).filter(|audited| audited.audit.region == *region);
-            own.map(|audited| audited.audit.carrying_permeability()).fold(0.0, f64::max)
+            // Of a curve no more than what stands for it: its largest permeability refuses nothing.
+            own.map(|audited| audited.audit.carrying_permeability().min(relative_permeability))
+                .fold(0.0, f64::max)
         };
         Iron { region, relative_permeability, carrying }
     });

@@ -4,7 +4,8 @@ use fluxmorph_solver::Material;
 
 use crate::config::{Coil, CoilShape, Config, RegionModel};
 
-/// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron.
+/// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron; the skin audit and the
+/// field have that of the curve.
 const OF_A_CURVE: f64 = 1000.0;
 
 /// The material of a region; air where the configuration says nothing.

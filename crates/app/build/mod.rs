@@ -45,8 +45,8 @@ pub use names::with_names;
 pub use outline::{Outline, OutlinedDesign, outline};
 pub(crate) use references::functionals;
 pub(crate) use refined::RefinedMesh;
-pub use skin::{Audited, SkinOf};
-pub(crate) use skin::{audited_in_field, least_thickness, result_warnings, warnings as skin_warnings};
+pub use skin::{Audited, PermeabilityOf};
+pub(crate) use skin::{audit_in_field, least_thickness, result_warnings, warnings as skin_warnings};
 pub(crate) use truncation::Truncation;
 
 use std::collections::BTreeMap;
@@ -161,8 +161,8 @@ fn problem_on(
     let open_patches = look_at_mesh(config, source, &full_mesh, motion_alone, &mut warnings)?;
     let curves = Curves::read(config, source);
     let audits = audits(config, &full_mesh, curves.as_ref().unwrap_or(&Curves::default()));
-    // Where a field will be known, it says what the skin of iron with a B–H curve is.
-    let is_known = |own: &&Audited| mode == Mode::Inspection || own.skin_of == SkinOf::Material;
+    // The field of an analysis says what the skin of iron with a B–H curve is.
+    let is_known = |own: &&Audited| mode != Mode::Analysis || own.permeability_of == PermeabilityOf::Material;
     warnings.extend(skin::warnings(audits.iter().filter(is_known)));
     let (mesh, conductors) = field::without_replaced_regions(config, &full_mesh)?;
     let mut faults = probes::faults(config, source, &full_mesh, &mesh);

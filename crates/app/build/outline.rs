@@ -75,7 +75,8 @@ pub fn outline(
         Some(_) => Some(outline_design((config, source), carried, &full_mesh, &mesh, &node_of)?),
         None => None,
     };
-    let audits = audits(config, &full_mesh, &Curves::read(config, source)?);
+    // Iron of which the table is gone has no audit.
+    let audits = audits(config, &full_mesh, &Curves::read(config, source).unwrap_or_default());
     Ok(Outline { full_mesh, mesh, node_of, audits, design })
 }
 

@@ -3,10 +3,10 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::parallel::Ownership;
-use fluxmorph_geometry::tet4::{Point, add, centroid, dot, norm};
+use fluxmorph_geometry::tet4::{Point, add, area_vector, centroid, dot, norm};
 use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, millimetres};
-use fluxmorph_optimizer::design::{DesignSurface, cell_size};
+use fluxmorph_optimizer::design::{DesignSurface, GridSide};
 use fluxmorph_optimizer::geometric::{WallThickness, faces_with_bodies};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup, Subregion};
@@ -61,8 +61,9 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         None => super::design::surface(config, source, design, full_mesh)?,
     };
     let surface = super::design::on_remaining(source, &full_surface, full_mesh, mesh)?;
-    let cell = cell_size(full_mesh, &super::design::triangles(design, full_mesh)?);
-    warnings.extend(fine_grid_warning(&surface, cell));
+    let triangles = super::design::triangles(design, full_mesh)?;
+    let sides = surface.grid_sides().into_iter().flatten();
+    warnings.extend(sides.filter_map(|side| fine_grid_warning(side, full_mesh, &triangles)));
     warnings.extend(idle_warning(&surface));
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
     warnings.extend(held_warning(inputs.remesh, mesh, &surface));
@@ -80,19 +81,33 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
 /// Distance of the points of a control grid in cells of the surface below which the mesh does not follow them.
 const FINEST_GRID: f64 = 0.5;
 
-/// A control grid of which the mesh cannot follow the variables one by one.
-fn fine_grid_warning(surface: &DesignSurface, cell: f64) -> Option<String> {
-    let sides = surface.grid_sides()?;
-    let side = sides.iter().find(|side| side.spacing() < FINEST_GRID * cell)?;
+/// A side of a control grid of which the mesh cannot follow the variables one by one.
+fn fine_grid_warning(side: GridSide, mesh: &Mesh, triangles: &[[NodeId; 3]]) -> Option<String> {
+    let cell = mean_extent(mesh, triangles, side.axis);
     let most = ((side.extent / cell) as usize + 1).max(2);
-    Some(format!(
-        "design.grid has a point every {:.3} mm along {}, and cells of the surface are {:.3} mm wide: the mesh does not follow them one \
-         by one, and what they gain may be lost on another mesh; take up to {most} points along {}, or refine the mesh",
-        Millimetres(side.spacing()),
-        side.axis,
-        Millimetres(cell),
-        side.axis
-    ))
+    (side.spacing() < FINEST_GRID * cell && side.count > most).then(|| {
+        format!(
+            "design.grid has a point every {:.3} mm along {axis}, where cells of the surface are {:.3} mm wide: the mesh does not follow \
+             them one by one, and what they gain may be lost on another mesh; take up to {most} points along {axis}, or refine the mesh",
+            Millimetres(side.spacing()),
+            Millimetres(cell),
+            axis = side.axis_name(),
+        )
+    })
+}
+
+/// The mean of the triangles' extents along an axis [m], by their areas.
+fn mean_extent(mesh: &Mesh, triangles: &[[NodeId; 3]], axis: usize) -> f64 {
+    let (mut sum, mut whole) = (0.0, 0.0);
+    for triangle in triangles {
+        let corners = triangle.map(|n| mesh.point(n));
+        let (area, along) = (norm(area_vector(corners)), corners.map(|x| x[axis]));
+        let greatest = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
+        let least = along.into_iter().fold(f64::INFINITY, f64::min);
+        sum += area * (greatest - least);
+        whole += area;
+    }
+    sum / whole
 }
 
 /// Points of a control grid that move nothing.

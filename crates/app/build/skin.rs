@@ -1,12 +1,12 @@
 //! Skin-depth audits of the conductors: of the mesh as it is, of the thinnest design allowed, and of a design that was found.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::tet4::{Point, add};
-use fluxmorph_geometry::{Mesh, NodeId, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_optimizer::problem::{Problem, Shape};
 use fluxmorph_solver::Material;
-use fluxmorph_solver::audit::{SkinAudit, conductor_of, skin_audit};
+use fluxmorph_solver::audit::{SkinAudit, conductor_of, first_layer, skin_audit};
 
 use super::curves::Curves;
 use super::entries::material;
@@ -15,7 +15,7 @@ use crate::config::{self, Config, Limit, RegionModel};
 
 /// Of which permeability a skin depth is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SkinOf {
+pub enum PermeabilityOf {
     /// That of a linear material.
     Material,
     /// The largest of a B–H curve: what the field leaves of it is not known yet.
@@ -30,7 +30,7 @@ pub struct Audited {
     /// What was found.
     pub audit: SkinAudit,
     /// Of which permeability.
-    pub skin_of: SkinOf,
+    pub permeability_of: PermeabilityOf,
     /// At which frequency [Hz].
     pub frequency: f64,
     /// Meshed, or replaced by its impedance surface.
@@ -43,29 +43,29 @@ impl Audited {
         let (coarse, thin) = (self.audit.volume_warning(), self.audit.impedance_warning());
         let depths = self.audit.thickness_in_skin_depths;
         let permeability = self.audit.relative_permeability;
-        match (self.model, self.skin_of) {
-            (RegionModel::Volume, SkinOf::LargestOfCurve) => coarse.map(|text| {
+        match (self.model, self.permeability_of) {
+            (RegionModel::Volume, PermeabilityOf::LargestOfCurve) => coarse.map(|text| {
                 format!(
                     "{}. Refine the skin: the depth is that of the largest permeability of the B–H curve, {permeability:.0}; \
                      where iron saturates it is more, and an analysis says whether the mesh carries that",
                     finding(&text)
                 )
             }),
-            (RegionModel::Volume, SkinOf::Field) => coarse.map(|text| {
+            (RegionModel::Volume, PermeabilityOf::Field) => coarse.map(|text| {
                 format!(
                     "{}. Refine the skin: the depth is that of the median permeability that the field leaves at its surface, \
-                     {permeability:.0}",
+                     {permeability:.0}, and smaller where there is more",
                     finding(&text)
                 )
             }),
             // Neither model must send to the other where that one has an objection too.
-            (RegionModel::Volume, SkinOf::Material) if thin.is_some() => coarse.map(|text| {
+            (RegionModel::Volume, PermeabilityOf::Material) if thin.is_some() => coarse.map(|text| {
                 format!(
                     "{}. Refine the skin: at {depths:.1} skin depths on average the region is too thin for an impedance surface",
                     finding(&text)
                 )
             }),
-            (RegionModel::Volume, SkinOf::Material) => coarse,
+            (RegionModel::Volume, PermeabilityOf::Material) => coarse,
             (RegionModel::Impedance, _) if coarse.is_some() => thin.map(|text| {
                 format!("{text} with thinner elements at its surface: these are too thick for the skin depth")
             }),
@@ -80,7 +80,7 @@ fn finding(warning: &str) -> &str {
     warning.split(". Refine the skin").next().unwrap_or_default()
 }
 
-/// The warnings of audits, one a region: of many frequencies that of the worst.
+/// The warnings of audits, one a region: of many frequencies and loads that of the worst.
 pub(crate) fn warnings<'a>(audits: impl IntoIterator<Item = &'a Audited>) -> Vec<String> {
     let mut by_region: BTreeMap<&str, Vec<(&Audited, String)>> = BTreeMap::new();
     for audited in audits {
@@ -89,37 +89,38 @@ pub(crate) fn warnings<'a>(audits: impl IntoIterator<Item = &'a Audited>) -> Vec
         }
     }
     let worst = |of_region: Vec<(&Audited, String)>| {
-        let count = of_region.len();
+        let frequencies: BTreeSet<u64> = of_region.iter().map(|(own, _)| own.frequency.to_bits()).collect();
         // A mesh carries the thinnest skin last, an impedance surface stands for the deepest last.
-        let extent = |(own, _): &(&Audited, String)| match own.model {
+        let badness = |(own, _): &(&Audited, String)| match own.model {
             RegionModel::Impedance => own.audit.skin_depth,
             RegionModel::Volume | RegionModel::Perfect => -own.audit.skin_depth,
         };
-        let (audited, warning) = of_region.into_iter().max_by(|a, b| extent(a).total_cmp(&extent(b)))?;
-        Some(match count {
+        let (audited, warning) = of_region.into_iter().max_by(|a, b| badness(a).total_cmp(&badness(b)))?;
+        Some(match frequencies.len() {
             1 => warning,
-            _ => format!("at {} Hz, the worst of {count} frequencies: {warning}", audited.frequency),
+            count => format!("at {} Hz, the worst of {count} frequencies: {warning}", audited.frequency),
         })
     };
     by_region.into_values().filter_map(worst).collect()
 }
 
-/// Audits of all conductors that a mesh holds, at all frequencies. Iron with a B–H curve has the largest permeability of it.
+/// Audits of all conductors that a mesh holds, at all frequencies. Iron with a B–H curve has the largest permeability of it; where
+/// the curve could not be read there is none.
 pub(super) fn audits(config: &Config, mesh: &Mesh, curves: &Curves) -> Vec<Audited> {
     let frequencies = config.frequencies();
     let of = |(name, region): (&String, &config::Region)| {
         let conductor = conductor(config, mesh, name)?;
         let linear = material(config, name);
-        let (material, skin_of) = match curves.of(config, name) {
-            None => (linear, SkinOf::Material),
-            Some(curve) => {
-                let relative_permeability = curve.largest_permeability();
-                (Material { relative_permeability, ..linear }, SkinOf::LargestOfCurve)
-            }
+        let saturates = config.materials.get(&region.material).is_some_and(config::Material::saturates);
+        let (material, permeability_of) = if saturates {
+            let relative_permeability = curves.of(config, name)?.largest_permeability();
+            (Material { relative_permeability, ..linear }, PermeabilityOf::LargestOfCurve)
+        } else {
+            (linear, PermeabilityOf::Material)
         };
         let at = |&frequency: &f64| {
             let audit = audit(config, mesh, &conductor, &material, frequency)?;
-            Some(Audited { audit, skin_of, frequency, model: region.model })
+            Some(Audited { audit, permeability_of, frequency, model: region.model })
         };
         Some(frequencies.iter().filter_map(at).collect::<Vec<_>>())
     };
@@ -127,16 +128,21 @@ pub(super) fn audits(config: &Config, mesh: &Mesh, curves: &Curves) -> Vec<Audit
     config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
 }
 
-/// The audit of a meshed conductor whose surface has this permeability in the field of an analysis.
-pub(crate) fn audited_in_field(
+/// The audit of a meshed conductor in the field of an analysis, which leaves the elements of its first layer, with the areas [m²] of
+/// their faces, this permeability.
+pub(crate) fn audit_in_field(
     (config, mesh): (&Config, &Mesh),
     name: &str,
-    relative_permeability: f64,
     frequency: f64,
+    relative_permeability: impl Fn(&[(ElementId, f64)]) -> Option<f64>,
 ) -> Option<Audited> {
-    let material = Material { relative_permeability, ..material(config, name) };
-    let audit = audit(config, mesh, &conductor(config, mesh, name)?, &material, frequency)?;
-    Some(Audited { audit, skin_of: SkinOf::Field, frequency, model: RegionModel::Volume })
+    let conductor = conductor(config, mesh, name)?;
+    let faces = first_layer(mesh, (conductor.0, &conductor.1));
+    let layer: Vec<(ElementId, f64)> = faces.iter().map(|face| (face.element, face.area)).collect();
+    let material =
+        Material { relative_permeability: relative_permeability(&layer)?, ..material(config, name) };
+    let audit = audit(config, mesh, &conductor, &material, frequency)?;
+    Some(Audited { audit, permeability_of: PermeabilityOf::Field, frequency, model: RegionModel::Volume })
 }
 
 fn audit(
@@ -188,7 +194,9 @@ pub(super) fn bound_warnings(
     // Where the mesh does not come to a bound in one step, the audit of the result is the next one.
     if let Ok(moved) = problem.moved(p) {
         warnings.extend(
-            new_objections(config, audits, &moved.mesh).into_iter().map(|text| format!("at {key}: {text}")),
+            new_objections(config, audits.iter(), &moved.mesh)
+                .into_iter()
+                .map(|text| format!("at {key}: {text}")),
         );
     }
     warnings
@@ -203,21 +211,26 @@ pub(crate) fn result_warnings(
     thinnest: &LeastThickness,
 ) -> Vec<String> {
     let sound = audits.iter().filter(|audited| audited.warning().is_none());
-    sound.filter_map(|own| wall_warning(own, thinnest)).chain(new_objections(config, audits, mesh)).collect()
+    // What iron with a B–H curve has is said of its field.
+    let linear = audits.iter().filter(|own| own.permeability_of == PermeabilityOf::Material);
+    sound.filter_map(|own| wall_warning(own, thinnest)).chain(new_objections(config, linear, mesh)).collect()
 }
 
-/// Objections to meshed conductors of a moved mesh to which there was none at the start. What iron with a B–H curve has there is
-/// known from its field alone.
-fn new_objections(config: &Config, audits: &[Audited], mesh: &Mesh) -> Vec<String> {
-    let is_looked_at = |own: &&Audited| {
-        own.model == RegionModel::Volume && own.skin_of == SkinOf::Material && own.warning().is_none()
-    };
+/// Objections to meshed conductors of a moved mesh to which there was none at the start.
+fn new_objections<'a>(
+    config: &Config,
+    audits: impl Iterator<Item = &'a Audited>,
+    mesh: &Mesh,
+) -> Vec<String> {
+    let is_looked_at = |own: &&Audited| own.model == RegionModel::Volume && own.warning().is_none();
     let again = |then: &Audited| {
-        let (name, frequency) = (&then.audit.region, then.frequency);
-        let audit = audit(config, mesh, &conductor(config, mesh, name)?, &material(config, name), frequency)?;
+        let name = &then.audit.region;
+        let relative_permeability = then.audit.relative_permeability;
+        let material = Material { relative_permeability, ..material(config, name) };
+        let audit = audit(config, mesh, &conductor(config, mesh, name)?, &material, then.frequency)?;
         Some(Audited { audit, ..*then })
     };
-    let moved: Vec<Audited> = audits.iter().filter(is_looked_at).filter_map(again).collect();
+    let moved: Vec<Audited> = audits.filter(is_looked_at).filter_map(again).collect();
     warnings(&moved)
 }
 

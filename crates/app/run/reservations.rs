@@ -1,19 +1,20 @@
 //! What the field of a design says against the model it was computed with: iron beyond saturation with a linear law, skins
 //! that the mesh or the impedance surface of that design does not carry.
 //!
-//! `check` cannot know any of it. It is said at the end of a run or an analysis, and kept in `result.json`.
+//! `check` cannot know it. It is said at the end of a run or an analysis, and kept in `result.json`.
 
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, Mesh, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
+use fluxmorph_solver::audit::weighted_median;
 use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
 use crate::build::{
-    Audited, Setup, audited_in_field, least_thickness, material, result_warnings, skin_warnings,
+    Audited, Setup, audit_in_field, least_thickness, material, result_warnings, skin_warnings,
 };
 use crate::config::{Config, Goal, RegionModel};
 use crate::files::ObjectiveResult;
@@ -104,44 +105,30 @@ fn skins_of_curves(config: &Config, problem: &Problem, analysis: &Analysis) -> V
     let states = problem.states().iter().zip(&analysis.solutions);
     let alternating = states.filter(|(model, _)| model.setup().frequency > 0.0);
     let of = |(model, solution): (&FieldModel, &FieldSolution)| {
-        let audited = |name: &String| {
-            let permeability = median_permeability(model, solution, mesh, name)?;
-            audited_in_field((config, mesh), name, permeability, model.setup().frequency)
-        };
+        let permeability = |layer: &[(ElementId, f64)]| median_permeability(model, solution, mesh, layer);
+        let audited =
+            |name: &String| audit_in_field((config, mesh), name, model.setup().frequency, permeability);
         names.iter().filter_map(audited).collect::<Vec<_>>()
     };
     alternating.flat_map(of).collect()
 }
 
-/// The median, by area, of the relative permeability at the surface of a region with a B–H curve.
-fn median_permeability(model: &FieldModel, solution: &FieldSolution, mesh: &Mesh, name: &str) -> Option<f64> {
-    let topology = mesh.topology();
-    let region = topology.region(name).ok()?;
-    let (elements, areas): (Vec<ElementId>, Vec<f64>) = topology
-        .facets()
-        .iter()
-        .filter_map(|facet| {
-            let sides = [facet.inside, facet.outside?];
-            let own = sides.map(|e| topology.region_of()[e.index()] == region);
-            let area = norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
-            (own[0] != own[1]).then(|| (sides[usize::from(own[1])], area))
-        })
-        .unzip();
-    let curve = model.curve_of(*elements.first()?)?;
+/// The median of the relative permeability in elements with a B–H curve, by what they weigh.
+fn median_permeability(
+    model: &FieldModel,
+    solution: &FieldSolution,
+    mesh: &Mesh,
+    weighed: &[(ElementId, f64)],
+) -> Option<f64> {
+    let curve = model.curve_of(weighed.first()?.0)?;
     let permeability = |b: f64| match curve.at(b).field_strength {
         h if h > 0.0 => b / (VACUUM_PERMEABILITY * h),
         _ => curve.largest_permeability(),
     };
+    let elements: Vec<ElementId> = weighed.iter().map(|own| own.0).collect();
     let fields = solution.flux_densities_of(model, mesh, &elements);
-    let mut at: Vec<(f64, f64)> = fields.into_iter().map(|b| permeability(peak(b))).zip(areas).collect();
-    at.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = 0.5 * at.iter().map(|own| own.1).sum::<f64>();
-    let mut below = 0.0;
-    let is_in_the_middle = |own: &&(f64, f64)| {
-        below += own.1;
-        below >= half
-    };
-    at.iter().find(is_in_the_middle).map(|own| own.0)
+    let of = |(b, own): (_, &(ElementId, f64))| (permeability(peak(b)), own.1);
+    weighted_median(&mut fields.into_iter().zip(weighed).map(of).collect::<Vec<_>>())
 }
 
 /// Iron beyond saturation, by region.
@@ -153,7 +140,6 @@ fn saturated(
 ) -> BTreeMap<String, Saturated> {
     let mesh = &analysis.mesh;
     let topology = mesh.topology();
-    // A material with a curve has µ = 1 here.
     let share = |name: &String| polarised_share(material(config, name).relative_permeability);
     let shares: Vec<f64> = topology.region_names().iter().map(share).collect();
     let share_at = |e: &ElementId| shares[topology.region_of()[e.index()].index()];

@@ -140,20 +140,27 @@ impl Motion {
         law: &dyn EnergyLaw,
         path: &dyn Fn(f64) -> Vec<Point>,
     ) -> Result<(f64, Moved), RemeshError> {
-        let first = law.equilibrium(&path(0.0))?;
-        let (mut low, mut high, mut best) = (0.0, 1.0, None);
+        let is_final = law.has_one_equilibrium();
         // Of a law with several equilibria those near a tangled one are tangled too: what is carried leads to what is.
-        let mut near = first.clone();
+        let mut near = if is_final { None } else { Some(law.equilibrium(&path(0.0))?) };
+        let (mut low, mut high, mut best) = (0.0, 1.0, None);
         for _ in 0..SHARE_BITS {
             let middle = 0.5 * (low + high);
-            let own = settled(law.near(&near, &path(middle)))?;
-            match (self.roomy(law, own.clone())?, own) {
-                (Some(moved), Some(own)) => (low, best, near) = (middle, Some(moved), own),
-                _ => high = middle,
+            let design = path(middle);
+            let nearby = near.as_ref().map(|near| settled(law.near(near, &design))).transpose()?.flatten();
+            let own = match nearby {
+                None => settled(law.equilibrium(&design))?,
+                nearby => nearby,
+            };
+            match self.roomy(law, own.clone())? {
+                Some(moved) => {
+                    (low, best) = (middle, Some(moved));
+                    near = if is_final { None } else { own };
+                }
+                None => high = middle,
             }
         }
         // The mesh of a design is that which is found from nothing else.
-        let is_final = law.has_one_equilibrium();
         while low > 0.0 {
             let own =
                 if is_final { best.take() } else { self.roomy(law, settled(law.equilibrium(&path(low)))?)? };
@@ -162,7 +169,7 @@ impl Motion {
             }
             low = if low > SHORTEST_PART { 0.5 * low } else { 0.0 };
         }
-        Ok((0.0, self.at(first)?))
+        Ok((0.0, self.at(law.equilibrium(&path(0.0))?)?))
     }
 
     /// The mesh of an equilibrium, where there is one and it has the least room.

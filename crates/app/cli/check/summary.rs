@@ -19,7 +19,8 @@ use super::advice::advice;
 use super::estimate::EstimateSummary;
 use super::reach::Reach;
 use crate::build::{
-    Audited, Mode, Setup, SkinOf, Truncation, memory_limit, motion_in_words, set_up_watched, stiffness_policy,
+    Audited, Mode, PermeabilityOf, Setup, Truncation, memory_limit, motion_in_words, set_up_watched,
+    stiffness_policy,
 };
 use crate::config::{
     self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, Material, MeshConfig, Objective,
@@ -173,7 +174,7 @@ impl SkinSummary {
             region: audit.region.clone(),
             model: audited.model.name(),
             skin_depth_m: audit.skin_depth,
-            largest_permeability: (audited.skin_of == SkinOf::LargestOfCurve)
+            largest_permeability: (audited.permeability_of == PermeabilityOf::LargestOfCurve)
                 .then_some(audit.relative_permeability),
             median_elements_per_skin_depth: audit.median_elements_per_skin_depth,
             least_elements_per_skin_depth: audit.least_elements_per_skin_depth,

@@ -170,7 +170,7 @@ fn objective(summary: &Summary<'_>) -> String {
 
 fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     if let Some(design) = summary.design {
-        let side = |side: GridSide| format!("{} along {}", side.count, side.axis);
+        let side = |side: GridSide| format!("{} along {}", side.count, side.axis_name());
         let grid = summary
             .grid_sides
             .map(|sides| format!(", grid {}", sides.map(side).join(", ")))

@@ -9,7 +9,7 @@ use super::data::RunData;
 use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
 use super::{harmonics, iron};
-use crate::build::{Audited, Outline, SkinOf, skin_warnings};
+use crate::build::{Audited, Outline, PermeabilityOf, skin_warnings};
 use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateResult, TermResult};
 use crate::show::Evaluation;
@@ -311,9 +311,9 @@ pub(super) fn skin(outline: &Outline, result: Option<&RunResult>) -> Markup {
         vec![
             a.region.clone(),
             model.to_owned(),
-            match audited.skin_of {
-                SkinOf::LargestOfCurve => format!("{} (unsaturated)", number(1e3 * a.skin_depth, 3)),
-                SkinOf::Material | SkinOf::Field => number(1e3 * a.skin_depth, 3),
+            match audited.permeability_of {
+                PermeabilityOf::LargestOfCurve => format!("{} (unsaturated)", number(1e3 * a.skin_depth, 3)),
+                PermeabilityOf::Material | PermeabilityOf::Field => number(1e3 * a.skin_depth, 3),
             },
             if audited.model == RegionModel::Volume {
                 format!("{median} (least {least})")
@@ -326,7 +326,9 @@ pub(super) fn skin(outline: &Outline, result: Option<&RunResult>) -> Markup {
     let rows: Vec<Vec<String>> = outline.audits.iter().map(row).collect();
     let head =
         ["conductor", "model", "skin depth [mm]", "elements per skin depth", "thickness 2V/S [skin depths]"];
-    let warnings = skin_warnings(&outline.audits);
+    // What is supposed of iron with a B–H curve a result knows.
+    let is_said = |own: &&Audited| result.is_none() || own.permeability_of == PermeabilityOf::Material;
+    let warnings = skin_warnings(outline.audits.iter().filter(is_said));
     // What a result warns of stands above.
     let said = |warning: &String| result.is_some_and(|result| result.warnings.contains(warning));
     html! {

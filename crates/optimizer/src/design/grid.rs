@@ -23,8 +23,8 @@ pub fn dominant_axis(vector: Point) -> usize {
 /// One side of a control grid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridSide {
-    /// The coordinate along which its points lie: `'x'`, `'y'` or `'z'`.
-    pub axis: char,
+    /// The coordinate along which its points lie.
+    pub axis: usize,
     /// Number of points.
     pub count: usize,
     /// From the first to the last [m].
@@ -32,6 +32,11 @@ pub struct GridSide {
 }
 
 impl GridSide {
+    /// `x`, `y` or `z`.
+    pub fn axis_name(&self) -> char {
+        axis_name(self.axis)
+    }
+
     /// From one point to the next [m].
     pub fn spacing(&self) -> f64 {
         self.extent / (self.count - 1) as f64
@@ -89,7 +94,7 @@ impl Grid {
     pub(super) fn sides(&self) -> [GridSide; 2] {
         [0, 1].map(|side| {
             let (low, high) = self.limits[side];
-            GridSide { axis: axis_name(self.across[side]), count: self.counts[side], extent: high - low }
+            GridSide { axis: self.across[side], count: self.counts[side], extent: high - low }
         })
     }
 

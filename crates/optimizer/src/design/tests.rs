@@ -74,7 +74,7 @@ fn the_papers_control_grid_has_91_points_in_the_contracts_order() {
         assert!((0..3).all(|d| (point[d] - expected[d]).abs() < 1e-12), "{k}: {point:?}");
     }
     let [slow, fast] = surface.grid_sides().expect("a grid");
-    assert_eq!([(slow.axis, slow.count), (fast.axis, fast.count)], [('x', 7), ('y', 13)]);
+    assert_eq!([(slow.axis, slow.count), (fast.axis, fast.count)], [(0, 7), (1, 13)]);
     assert!([slow, fast].iter().all(|side| (side.spacing() - 0.02).abs() < 1e-15));
     assert!(plate_surface(&plate(), None).grid_sides().is_none());
 }

@@ -13,7 +13,7 @@ pub use nodal::NodalErrors;
 
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, area_vector, norm, sub, volume};
-use fluxmorph_geometry::{ElementId, Mesh, Millimetres, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId};
 
 use crate::elements::Order;
 use crate::material::Material;
@@ -130,7 +130,6 @@ pub fn skin_audit(
 ) -> Option<SkinAudit> {
     let skin_depth = material.skin_depth(2.0 * std::f64::consts::PI * frequency)?;
     let topology = mesh.topology();
-    let region_at = |e: ElementId| topology.region_of()[e.index()];
     let own: Vec<[Point; 4]> = topology.elements_of(region).into_iter().map(|e| mesh.vertices(e)).collect();
     let own_volume: f64 = own.iter().map(|&vertices| volume(vertices)).sum();
     let squares: f64 = own.iter().map(|&vertices| volume(vertices) * mean_square_edge(vertices)).sum();
@@ -139,49 +138,77 @@ pub fn skin_audit(
     let around = AxisBox::around(elements.as_flattened());
     let all_volume: f64 = elements.iter().map(|&vertices| volume(vertices)).sum();
 
-    // (elements per skin depth, area) of every face of the conductor; symmetry planes are none.
-    let (mut layers, mut faces) = ([Vec::new(), Vec::new()], Vec::new());
-    let mut surface = 0.0;
-    for facet in topology.facets() {
-        let Some(outside) = facet.outside else { continue };
-        let [is_inside, is_outside] = [facet.inside, outside].map(|e| conductor.contains(&region_at(e)));
-        if is_inside == is_outside {
-            continue;
-        }
-        let element = if is_inside { facet.inside } else { outside };
-        let area = norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
-        let height = 3.0 * volume(mesh.vertices(element)) / area;
-        let is_own = region_at(element) == region;
-        layers[usize::from(!is_own)].push((order.degree() as f64 * skin_depth / height, area));
-        faces.push(facet.nodes);
-        surface += area;
-    }
-    let [own_layers, others] = layers;
-    let mut layers = if own_layers.is_empty() { others } else { own_layers };
+    let faces: Vec<ConductorFace> = conductor_faces(mesh, conductor).collect();
+    let surface: f64 = faces.iter().map(|face| face.area).sum();
+    let elements_per_depth = |face: &ConductorFace| {
+        let height = 3.0 * volume(mesh.vertices(face.element)) / face.area;
+        (order.degree() as f64 * skin_depth / height, face.area)
+    };
+    let layer = first_layer(mesh, (region, conductor));
+    let mut layers: Vec<(f64, f64)> = layer.iter().map(elements_per_depth).collect();
     let looked_at: f64 = layers.iter().map(|l| l.1).sum();
-    layers.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let median = weighted_median(&mut layers)?;
     let least = layers.first()?.0;
-    let mut below = 0.0;
-    let median = layers
-        .iter()
-        .find(|l| {
-            below += l.1;
-            below >= 0.5 * looked_at
-        })?
-        .0;
     let coarse: f64 = layers.iter().filter(|l| l.0 < 1.0).map(|l| l.1).sum();
+    let nodes: Vec<[NodeId; 3]> = faces.iter().map(|face| face.nodes).collect();
     Some(SkinAudit {
         region: topology.region_names()[region.index()].clone(),
         skin_depth,
         median_elements_per_skin_depth: median,
         least_elements_per_skin_depth: least,
         coarse_share: coarse / looked_at,
-        coarse_layers: layers::coarse_layers(mesh, region, &faces, skin_depth, order),
+        coarse_layers: layers::coarse_layers(mesh, region, &nodes, skin_depth, order),
         thickness_in_skin_depths: 2.0 * all_volume / surface / skin_depth,
         extent: norm(sub(around.upper, around.lower)),
         edge_length: (squares / own_volume).sqrt(),
         relative_permeability: material.relative_permeability,
     })
+}
+
+/// A face of a conductor; symmetry planes are none.
+#[derive(Clone, Copy, Debug)]
+pub struct ConductorFace {
+    /// Its nodes.
+    pub nodes: [NodeId; 3],
+    /// The element under it.
+    pub element: ElementId,
+    /// [m²]
+    pub area: f64,
+}
+
+/// The faces of the regions of a conductor, as one.
+fn conductor_faces<'a>(
+    mesh: &'a Mesh,
+    conductor: &'a [RegionId],
+) -> impl Iterator<Item = ConductorFace> + 'a {
+    let region_of = mesh.topology().region_of();
+    mesh.topology().facets().iter().filter_map(move |facet| {
+        let sides = [facet.inside, facet.outside?];
+        let [is_inside, is_outside] = sides.map(|e| conductor.contains(&region_of[e.index()]));
+        let area = || norm(area_vector(facet.nodes.map(|n| mesh.point(n))));
+        let element = sides[usize::from(is_outside)];
+        (is_inside != is_outside).then(|| ConductorFace { nodes: facet.nodes, element, area: area() })
+    })
+}
+
+/// The faces of a conductor under which the skin of one of its regions is looked at: the region's own, and all where it has none.
+pub fn first_layer(mesh: &Mesh, (region, conductor): (RegionId, &[RegionId])) -> Vec<ConductorFace> {
+    let region_of = mesh.topology().region_of();
+    let is_own = |face: &ConductorFace| region_of[face.element.index()] == region;
+    let (own, others): (Vec<_>, Vec<_>) = conductor_faces(mesh, conductor).partition(is_own);
+    if own.is_empty() { others } else { own }
+}
+
+/// The median of values by their weights, which sorts them; `None` without any.
+pub fn weighted_median(values: &mut [(f64, f64)]) -> Option<f64> {
+    values.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * values.iter().map(|own| own.1).sum::<f64>();
+    let mut below = 0.0;
+    let is_in_the_middle = |own: &&(f64, f64)| {
+        below += own.1;
+        below >= half
+    };
+    values.iter().find(is_in_the_middle).map(|own| own.0)
 }
 
 /// The conductor that a region is a part of: with it those of others, alike in material and model, that faces join with it, one
