@@ -24,7 +24,7 @@ fn check(overrides: &[&str]) -> Value {
 }
 
 #[test]
-fn the_permeability_of_iron_with_a_curve_is_that_of_its_own_permeability() {
+fn the_skin_of_iron_with_a_curve_is_that_of_its_own_permeability() {
     let depth = |summary: &Value| number(summary, "/skin/0/skin_depth_m");
     let (linear, curve) = (check(&IRON), check(&[&IRON[..], &[SATURATING]].concat()));
     assert_eq!(depth(&linear), depth(&curve));
