@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{Point, add, area_vector, centroid, dot, norm};
 use fluxmorph_geometry::topology::{Facet, face_key};
@@ -61,10 +62,11 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         None => super::design::surface(config, source, design, full_mesh)?,
     };
     let surface = super::design::on_remaining(source, &full_surface, full_mesh, mesh)?;
-    let triangles = super::design::triangles(design, full_mesh)?;
-    let sides = surface.grid_sides().into_iter().flatten();
-    warnings.extend(sides.filter_map(|side| fine_grid_warning(side, full_mesh, &triangles)));
-    warnings.extend(idle_warning(&surface));
+    if let Some(sides) = surface.grid_sides() {
+        let triangles = super::design::triangles(design, full_mesh)?;
+        warnings.extend(sides.into_iter().filter_map(|side| fine_grid_warning(side, full_mesh, &triangles)));
+        warnings.extend(idle_warning(&surface));
+    }
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
     warnings.extend(held_warning(inputs.remesh, mesh, &surface));
     warnings.extend(slid_warning(inputs.remesh, design));
@@ -101,10 +103,8 @@ fn mean_extent(mesh: &Mesh, triangles: &[[NodeId; 3]], axis: usize) -> f64 {
     let (mut sum, mut whole) = (0.0, 0.0);
     for triangle in triangles {
         let corners = triangle.map(|n| mesh.point(n));
-        let (area, along) = (norm(area_vector(corners)), corners.map(|x| x[axis]));
-        let greatest = along.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        let least = along.into_iter().fold(f64::INFINITY, f64::min);
-        sum += area * (greatest - least);
+        let (area, around) = (norm(area_vector(corners)), AxisBox::around(&corners));
+        sum += area * (around.upper[axis] - around.lower[axis]);
         whole += area;
     }
     sum / whole

@@ -128,21 +128,21 @@ pub(super) fn audits(config: &Config, mesh: &Mesh, curves: &Curves) -> Vec<Audit
     config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
 }
 
-/// The audit of a meshed conductor in the field of an analysis, which leaves the elements of its first layer, with the areas [m²] of
-/// their faces, this permeability.
+/// An audit of iron with a B–H curve in the mesh and the field of an analysis, which leaves the elements of its first layer, with the
+/// areas [m²] of their faces, this permeability.
 pub(crate) fn audit_in_field(
     (config, mesh): (&Config, &Mesh),
-    name: &str,
-    frequency: f64,
+    supposed: &Audited,
     relative_permeability: impl Fn(&[(ElementId, f64)]) -> Option<f64>,
 ) -> Option<Audited> {
+    let (name, frequency) = (&supposed.audit.region, supposed.frequency);
     let conductor = conductor(config, mesh, name)?;
     let faces = first_layer(mesh, (conductor.0, &conductor.1));
     let layer: Vec<(ElementId, f64)> = faces.iter().map(|face| (face.element, face.area)).collect();
     let material =
         Material { relative_permeability: relative_permeability(&layer)?, ..material(config, name) };
     let audit = audit(config, mesh, &conductor, &material, frequency)?;
-    Some(Audited { audit, permeability_of: PermeabilityOf::Field, frequency, model: RegionModel::Volume })
+    Some(Audited { audit, permeability_of: PermeabilityOf::Field, ..*supposed })
 }
 
 fn audit(

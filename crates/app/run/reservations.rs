@@ -14,7 +14,7 @@ use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
 use crate::build::{
-    Audited, Setup, audit_in_field, least_thickness, material, result_warnings, skin_warnings,
+    Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, result_warnings, skin_warnings,
 };
 use crate::config::{Config, Goal, RegionModel};
 use crate::files::ObjectiveResult;
@@ -52,7 +52,7 @@ impl Saturated {
 pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<String> {
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
-    all.extend(skin_warnings(&skins_of_curves(config, problem, analysis)));
+    all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
     let least = problem
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
@@ -99,18 +99,18 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
 }
 
 /// Skin audits of iron with a B–H curve, of the permeability that the fields leave at its surface.
-fn skins_of_curves(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<Audited> {
+fn skins_of_curves(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<Audited> {
     let mesh = &analysis.mesh;
-    let names = mesh.topology().region_names();
-    let states = problem.states().iter().zip(&analysis.solutions);
-    let alternating = states.filter(|(model, _)| model.setup().frequency > 0.0);
+    let states = setup.problem.states().iter().zip(&analysis.solutions);
     let of = |(model, solution): (&FieldModel, &FieldSolution)| {
+        let is_supposed = |own: &&Audited| {
+            own.permeability_of == PermeabilityOf::LargestOfCurve && own.frequency == model.setup().frequency
+        };
         let permeability = |layer: &[(ElementId, f64)]| median_permeability(model, solution, mesh, layer);
-        let audited =
-            |name: &String| audit_in_field((config, mesh), name, model.setup().frequency, permeability);
-        names.iter().filter_map(audited).collect::<Vec<_>>()
+        let supposed = setup.audits.iter().filter(is_supposed);
+        supposed.filter_map(|own| audit_in_field((config, mesh), own, permeability)).collect::<Vec<_>>()
     };
-    alternating.flat_map(of).collect()
+    states.flat_map(of).collect()
 }
 
 /// The median of the relative permeability in elements with a B–H curve, by what they weigh.

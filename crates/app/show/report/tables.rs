@@ -306,15 +306,14 @@ pub(super) fn skin(outline: &Outline, result: Option<&RunResult>) -> Markup {
             RegionModel::Impedance => "surface impedance",
             RegionModel::Perfect => "perfect conductor",
         };
+        let is_supposed = audited.permeability_of == PermeabilityOf::LargestOfCurve;
+        let unsaturated = if is_supposed { " (unsaturated)" } else { "" };
         let [median, least] =
             [a.median_elements_per_skin_depth, a.least_elements_per_skin_depth].map(|n| number(n, 3));
         vec![
             a.region.clone(),
             model.to_owned(),
-            match audited.permeability_of {
-                PermeabilityOf::LargestOfCurve => format!("{} (unsaturated)", number(1e3 * a.skin_depth, 3)),
-                PermeabilityOf::Material | PermeabilityOf::Field => number(1e3 * a.skin_depth, 3),
-            },
+            format!("{}{unsaturated}", number(1e3 * a.skin_depth, 3)),
             if audited.model == RegionModel::Volume {
                 format!("{median} (least {least})")
             } else {

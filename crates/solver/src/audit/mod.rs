@@ -144,13 +144,13 @@ pub fn skin_audit(
         let height = 3.0 * volume(mesh.vertices(face.element)) / face.area;
         (order.degree() as f64 * skin_depth / height, face.area)
     };
-    let layer = first_layer(mesh, (region, conductor));
-    let mut layers: Vec<(f64, f64)> = layer.iter().map(elements_per_depth).collect();
+    let nodes: Vec<[NodeId; 3]> = faces.iter().map(|face| face.nodes).collect();
+    let mut layers: Vec<(f64, f64)> =
+        looked_at_of(mesh, region, faces).iter().map(elements_per_depth).collect();
     let looked_at: f64 = layers.iter().map(|l| l.1).sum();
     let median = weighted_median(&mut layers)?;
     let least = layers.first()?.0;
     let coarse: f64 = layers.iter().filter(|l| l.0 < 1.0).map(|l| l.1).sum();
-    let nodes: Vec<[NodeId; 3]> = faces.iter().map(|face| face.nodes).collect();
     Some(SkinAudit {
         region: topology.region_names()[region.index()].clone(),
         skin_depth,
@@ -193,9 +193,13 @@ fn conductor_faces<'a>(
 
 /// The faces of a conductor under which the skin of one of its regions is looked at: the region's own, and all where it has none.
 pub fn first_layer(mesh: &Mesh, (region, conductor): (RegionId, &[RegionId])) -> Vec<ConductorFace> {
+    looked_at_of(mesh, region, conductor_faces(mesh, conductor).collect())
+}
+
+fn looked_at_of(mesh: &Mesh, region: RegionId, faces: Vec<ConductorFace>) -> Vec<ConductorFace> {
     let region_of = mesh.topology().region_of();
     let is_own = |face: &ConductorFace| region_of[face.element.index()] == region;
-    let (own, others): (Vec<_>, Vec<_>) = conductor_faces(mesh, conductor).partition(is_own);
+    let (own, others): (Vec<_>, Vec<_>) = faces.into_iter().partition(is_own);
     if own.is_empty() { others } else { own }
 }
 
