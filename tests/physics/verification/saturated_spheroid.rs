@@ -120,15 +120,15 @@ type Case = (f64, f64);
 /// what second order does.
 type Cases<'a> = [((ElementFamily, Order), f64, &'a [Case]); 3];
 
-/// Every field and both aspect ratios on linear elements, and the derivative on all elements.
+/// Both aspect ratios on linear elements, beyond the knee, and the derivative on all elements.
 const SOME: Cases<'_> = [
-    (LINEAR, 2.0, &[(1.0, APPLIED[0]), (1.0, APPLIED[2]), (1.5, APPLIED[1])]),
+    (LINEAR, 2.0, &[(1.0, APPLIED[2]), (1.5, APPLIED[1])]),
     (QUADRATIC, 4.0 / 3.0, &[(1.0, APPLIED[1])]),
     (NODAL, 4.0 / 3.0, &[(1.0, APPLIED[1])]),
 ];
 
 const OTHERS: Cases<'_> = [
-    (LINEAR, 2.0, &[(1.0, APPLIED[1]), (1.5, APPLIED[0]), (1.5, APPLIED[2])]),
+    (LINEAR, 2.0, &[(1.0, APPLIED[0]), (1.0, APPLIED[1]), (1.5, APPLIED[0]), (1.5, APPLIED[2])]),
     (QUADRATIC, 4.0 / 3.0, &[(1.5, APPLIED[1])]),
     (NODAL, 4.0 / 3.0, &[(1.5, APPLIED[1])]),
 ];
@@ -161,7 +161,7 @@ fn the_inner_field_of_a_saturated_spheroid_solves_a_scalar_equation() {
 }
 
 #[test]
-#[ignore = "five more saturated fields, half a minute"]
+#[ignore = "six more saturated fields, half a minute"]
 fn so_it_does_in_every_field_at_every_aspect_ratio() {
     inner_field_solves_the_equation(OTHERS);
 }
