@@ -1,5 +1,5 @@
 //! A run with a tolerance: its mesh is refined before the search, and after it for the best design, until the error bars of the
-//! objective are small enough.
+//! objective are small enough. A search pauses for an estimate now and then, so that no evaluations are spent on a gain of the mesh.
 //!
 //! Every mesh is a *level*. The journal has the evaluations of all levels one after the other, `refinements.json` the elements
 //! that were marked: a resumed run makes the same meshes again, and what was cut short before its marks were written is
@@ -20,6 +20,7 @@ use fluxmorph_remesh::Moved;
 use super::Session;
 use super::journal::mesh_hash;
 use super::recorder::DirectoryRecorder;
+use super::replayed::Behind;
 use crate::build::{Mode, RefinedMesh, Setup, memory_limit, remaining_elements, set_up_on};
 use crate::config::ElementOrder;
 use crate::error::Error;
@@ -29,6 +30,9 @@ use crate::show::RunObserver;
 /// What came of the wish for a finer mesh.
 enum Refined {
     Yes,
+    /// The mesh is fine enough.
+    NotNeeded,
+    /// It stays as it is, for a reason that was reported.
     No,
     /// There is nothing left to use it with: what ends the run, and a warning of the tolerance; a signal is none.
     OutOf(StopReason, Option<String>),
@@ -36,6 +40,10 @@ enum Refined {
 
 /// Evaluations with which a search on a finer mesh begins: of the initial design, and of the best one before it.
 const TAKEN_UP: usize = 2;
+
+/// Evaluations on a mesh after which a search pauses for an estimate the first time; the next times after twice as many each.
+/// Searches take ten to fifteen to converge.
+const FIRST_PAUSE: usize = 10;
 
 /// The time of a run: that of what it computes, refinements included, and not of what it repeats from its journal.
 struct TimeLimit {
@@ -94,22 +102,6 @@ impl Levels {
         format!("the error bar of the {design} design is {bar}, accuracy.tolerance {tolerance}")
     }
 
-    /// Whether the mesh stays as it is with an error bar, which is reported with what was `said` of it.
-    fn is_over(&self, bar: f64, said: &str, observer: &mut dyn RunObserver) -> bool {
-        if bar <= self.tolerance {
-            observer.note(&format!("{said}: the mesh is fine enough"));
-            return true;
-        }
-        if self.made >= self.most {
-            observer.warning(&format!(
-                "{said}, and all {} refinements are used: the tolerance is not kept; allow more accuracy.max_refinements, or \
-                 begin with a finer mesh",
-                self.most
-            ));
-        }
-        self.made >= self.most
-    }
-
     /// Those of a run that is begun or resumed; `None` without a tolerance.
     fn of(session: &Session<'_>) -> Result<Option<Self>, Error> {
         let accuracy = &session.config.accuracy;
@@ -117,6 +109,15 @@ impl Levels {
         let mesh = RefinedMesh::new(session.config, session.source, &session.setup.full_mesh)?;
         let kept = Refinements::read(&session.directory)?;
         Ok(Some(Self { mesh, kept, made: 0, tolerance, most: accuracy.max_refinements }))
+    }
+
+    /// After how many evaluations a search that has begun after `before` of them pauses, behind those that are `replayed`: where the
+    /// run before its interruption had refined, and else where it would have paused. `None` where nothing would follow.
+    fn pause(&self, before: usize, replayed: usize) -> Option<usize> {
+        let refined = self.kept.refinements.get(self.made).map(|step| step.evaluations);
+        let pauses = std::iter::successors(Some(FIRST_PAUSE), |pause| pause.checked_mul(2));
+        let next = || pauses.map(|pause| before + pause).find(|pause| *pause >= before + replayed);
+        if self.made < self.most { refined.or_else(next) } else { None }
     }
 
     /// The refinement that the run before its interruption made after so many evaluations.
@@ -153,9 +154,12 @@ impl Session<'_> {
             self.refine_before_search(levels, recorder.is_replaying(), &mut limit, observer)?;
         }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
+        start.pause = levels.as_ref().and_then(|own| own.pause(0, recorder.replayed_of(start.level)));
         let mut before: Option<Optimised> = None;
+        // Evaluations of a search that goes on after a pause.
+        let mut seen = 0;
         loop {
-            if recorder.is_replaying() {
+            if recorder.is_replaying() && seen == 0 {
                 limit.restart();
             }
             let first = self.setup.problem.moved(self.initial_design())?;
@@ -164,16 +168,24 @@ impl Session<'_> {
                 &start,
                 &mut self.setup.problem,
                 &settings,
-                observer,
+                &mut Behind { observer, seen },
                 recorder,
                 self.interrupted,
             )?;
-            let mut optimised = sum(before.take(), optimised);
             let (refined, at_best) = match &mut levels {
                 Some(levels) => self.refine_after_search(levels, &optimised, &limit, observer)?,
                 None => (Refined::No, None),
             };
             let is_refined = matches!(refined, Refined::Yes);
+            let is_paused = optimised.stop_reason == StopReason::Paused;
+            if is_paused && matches!(refined, Refined::NotNeeded | Refined::No) {
+                seen = optimised.evaluations - start.evaluations;
+                let wants_more = levels.as_ref().filter(|_| matches!(refined, Refined::NotNeeded));
+                start.pause = wants_more.and_then(|own| own.pause(start.evaluations, seen + 1));
+                recorder.rewind(start.level)?;
+                continue;
+            }
+            let mut optimised = sum(before.take(), optimised);
             if let Refined::OutOf(reason, warning) = refined {
                 warning.iter().for_each(|warning| observer.warning(warning));
                 optimised.warnings.extend(warning);
@@ -188,8 +200,11 @@ impl Session<'_> {
                 evaluations: optimised.evaluations,
                 iterations: optimised.iterations,
                 design: Some(optimised.best.values.clone()),
+                pause: None,
             };
-            before = Some(optimised);
+            let replayed = recorder.replayed_of(start.level);
+            start.pause = levels.as_ref().and_then(|own| own.pause(start.evaluations, replayed));
+            (before, seen) = (Some(optimised), 0);
         }
     }
 
@@ -236,7 +251,7 @@ impl Session<'_> {
             let of_initial = (&analysis, &estimate, scale);
             match self.refine(levels, (0, limit), of_initial, observer)? {
                 Refined::Yes => {}
-                Refined::No => return Ok(()),
+                Refined::NotNeeded | Refined::No => return Ok(()),
                 Refined::OutOf(_, warning) => {
                     warning.iter().for_each(|warning| observer.warning(warning));
                     return Ok(());
@@ -300,7 +315,16 @@ impl Session<'_> {
             return Ok(Refined::No);
         };
         let said = levels.compared(what, bar);
-        if levels.is_over(bar, &said, observer) {
+        if bar <= levels.tolerance {
+            observer.note(&format!("{said}: the mesh is fine enough"));
+            return Ok(Refined::NotNeeded);
+        }
+        if levels.made >= levels.most {
+            observer.warning(&format!(
+                "{said}, and all {} refinements are used: the tolerance is not kept; allow more accuracy.max_refinements, or \
+                 begin with a finer mesh",
+                levels.most
+            ));
             return Ok(Refined::No);
         }
         let is_used_up = evaluations > 0 && evaluations + TAKEN_UP > self.config.optimizer.max_evaluations;

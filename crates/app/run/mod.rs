@@ -18,6 +18,7 @@ pub mod morph;
 mod pieces;
 mod prepared;
 mod recorder;
+mod replayed;
 mod reservations;
 mod resume;
 pub mod shape_pair;

@@ -18,7 +18,8 @@
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
-//! * On a finer mesh a search goes on from the best design of the one before (`start`).
+//! * On a finer mesh a search goes on from the best design of the one before (`start`). A search may pause, to be looked at, and goes
+//!   on by a replay of what it has.
 //! * Limits of evaluations and time are checked before the mesh of each evaluation but the first: what was
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
 //!   then there is nothing new to keep.

@@ -53,6 +53,8 @@ pub(super) struct Run<'a> {
     pub(super) level: usize,
     /// Evaluations on coarser meshes.
     pub(super) first_evaluation: usize,
+    /// Evaluations after which the search pauses.
+    pause: Option<usize>,
     /// Whether several ranks compute, or computed what is replayed.
     pub(super) is_shared_out: bool,
 }
@@ -95,14 +97,15 @@ impl<'a> Run<'a> {
             stepping_back: None,
             level: 0,
             first_evaluation: 0,
+            pause: None,
             is_shared_out,
         }
     }
 
     /// Goes on counting where a search on a coarser mesh ended.
     pub(super) fn taking_over(self, start: &Start) -> Self {
-        let Start { level, evaluations, iterations, .. } = *start;
-        Self { level, evaluations, first_evaluation: evaluations, iterations, ..self }
+        let Start { level, evaluations, iterations, pause, .. } = *start;
+        Self { level, evaluations, first_evaluation: evaluations, iterations, pause, ..self }
     }
 
     pub(super) fn shape(&self) -> &Shape {
@@ -180,6 +183,11 @@ impl<'a> Run<'a> {
         is_over.then_some(StopReason::MaxTime)
     }
 
+    /// Whether the search pauses before its next evaluation.
+    pub(super) fn is_paused(&self) -> bool {
+        self.pause.is_some_and(|pause| self.evaluations >= pause)
+    }
+
     fn evaluations_left(&self) -> usize {
         self.settings.max_evaluations.saturating_sub(self.evaluations)
     }
@@ -195,6 +203,7 @@ impl<'a> Run<'a> {
         let reason = match self.limit_reached() {
             Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
             _ if left == 0 => Some(StopReason::MaxEvaluations),
+            None if self.is_paused() => Some(StopReason::Paused),
             // The last one is for a step back within the bounds.
             None if left == 1 && self.next_step_back()?.is_some() => Some(StopReason::MaxEvaluations),
             reason => reason,
@@ -281,33 +290,12 @@ impl<'a> Run<'a> {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }
-        let missed = self.missed().map(|miss| (miss.evaluation, miss.objective, miss.worst));
+        let warnings = if stop_reason == StopReason::Paused { Vec::new() } else { self.reservations() };
+        warnings.iter().for_each(|warning| self.warn(warning));
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
         };
-        let violated = best.sample.constraints.iter().zip(self.problem.constraints());
-        let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
-        let names: Vec<String> =
-            violated.map(|((excess, _), own)| format!("`{}` by {excess:.1e} of it", own.name)).collect();
         let best = self.with_field(best)?;
-        let mut warnings = Vec::new();
-        if best.violation > 0.0 {
-            warnings.push(format!(
-                "no design keeps all constraints: the best one is beyond the bound of {}; loosen what is violated, widen the \
-                 design's bounds, or allow more evaluations",
-                names.join(", of ")
-            ));
-        }
-        if let Some((evaluation, objective, (k, excess))) = missed.filter(|_| best.violation == 0.0) {
-            warnings.push(format!(
-                "evaluation {evaluation} has an objective of {objective:.6e}, against {:.6e} of the best design, and does not count: it is \
-                 beyond the bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
-                 method of those that take constraints",
-                best.objective,
-                self.problem.constraints()[k].name
-            ));
-        }
-        warnings.iter().for_each(|warning| self.warn(warning));
         let is_infeasible = stop_reason.is_converged() && best.violation > 0.0;
         Ok(Optimised {
             stop_reason: if is_infeasible { StopReason::Infeasible } else { stop_reason },
@@ -322,5 +310,33 @@ impl<'a> Run<'a> {
             timings: self.timings,
             warnings,
         })
+    }
+
+    /// What is to be said at the end of the best design and its constraints.
+    fn reservations(&self) -> Vec<String> {
+        let Some(best) = &self.best else { return Vec::new() };
+        let violated = best.sample.constraints.iter().zip(self.problem.constraints());
+        let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
+        let names: Vec<String> =
+            violated.map(|((excess, _), own)| format!("`{}` by {excess:.1e} of it", own.name)).collect();
+        let mut warnings = Vec::new();
+        if best.violation > 0.0 {
+            warnings.push(format!(
+                "no design keeps all constraints: the best one is beyond the bound of {}; loosen what is violated, widen the \
+                 design's bounds, or allow more evaluations",
+                names.join(", of ")
+            ));
+        }
+        if let Some(miss) = self.missed().filter(|_| best.violation == 0.0) {
+            let (evaluation, objective, (k, excess)) = (miss.evaluation, miss.objective, miss.worst);
+            warnings.push(format!(
+                "evaluation {evaluation} has an objective of {objective:.6e}, against {:.6e} of the best design, and does not count: it is \
+                 beyond the bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
+                 method of those that take constraints",
+                best.objective,
+                self.problem.constraints()[k].name
+            ));
+        }
+        warnings
     }
 }
