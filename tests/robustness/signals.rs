@@ -284,6 +284,9 @@ fn a_run_that_is_out_of_time_goes_on() {
     let first = finish(device.command("run", &out).args(["--max-time", "0.001 ms"]));
     first.with(1, &["all evaluations are saved", "fluxmorph resume"]);
     assert_eq!((rows(&out), &RunFolder(out.clone()).result()["stop_reason"]), (1, &"max_time".into()));
+    // However short the time, a resumed run gets on.
+    finish(&mut resume(&out)).with(1, &["all evaluations are saved"]);
+    assert_eq!(rows(&out), 2);
     finish(resume(&out).args(["--max-time", "1 h"])).completed();
     assert_same(&essence(&files(&out)), &expected, "out of time");
 }

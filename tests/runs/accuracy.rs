@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use crate::support::device::{BLOCK, shipped, written};
-use crate::support::folder::{RunFolder, count, number, read_json, scalars};
+use crate::support::device::{BLOCK, Device, shipped, written};
+use crate::support::essence::{assert_same, essence};
+use crate::support::folder::{RunFolder, count, files, number, read_json, scalars};
 use crate::support::program::{Finished, command, finish, fluxmorph, folder};
 
 /// The block on edge elements.
@@ -186,6 +187,51 @@ fn a_run_with_a_tolerance_refines_its_mesh_until_its_error_bar_is_within() {
     assert_eq!(last.parse::<usize>().expect("a number"), refinements);
     let page = std::fs::read_to_string(out.join("report.html")).expect("a report");
     assert!(page.contains("within the tolerance") && !page.contains("do not belong together"));
+}
+
+/// The block by a method that takes more than ten evaluations.
+fn lengthy(home: &Path, accuracy: &str) -> Device {
+    let accurate = format!("[accuracy]\n{accuracy}\n\n[analysis]");
+    let slow = [("algorithm = \"mma\"", "algorithm = \"slsqp\""), ("ftol_rel = 0", "ftol_rel = 1e-9")];
+    let longer = ("max_evaluations = 6", "max_evaluations = 16");
+    written("block", home, &[EDGES, slow[0], slow[1], longer, ("[analysis]", &accurate)])
+}
+
+/// What is looked at on the way costs the search nothing, and is shown once.
+#[test]
+fn a_search_that_pauses_for_an_estimate_goes_on_as_one_that_does_not() {
+    let home = folder();
+    let history = |accuracy: &str| {
+        let out = home.path().join("out");
+        let device = lengthy(home.path(), accuracy);
+        let said = finish(device.command("run", &out).arg("--force")).completed().stderr;
+        (said, essence(&files(&out)).remove(Path::new("history.csv")).expect("a history"))
+    };
+    let (said, rows) = history("tolerance = 0.9");
+    assert_eq!(said.matches("of the best design is").count(), 2, "on the way and at the end: {said}");
+    assert_eq!(said.lines().filter(|line| line.starts_with("   3    3 ")).count(), 1, "{said}");
+    assert!(rows.iter().filter(|byte| **byte == b'\n').count() > 12, "{said}");
+    let (said, alone) = history("estimate = true");
+    assert!(!said.contains("of the best design is"), "{said}");
+    assert_eq!(String::from_utf8(rows), String::from_utf8(alone));
+}
+
+/// The mesh is refined where the gain of the search becomes the mesh's, and wherever a run was cut it is the same one.
+#[test]
+fn a_mesh_is_refined_during_a_search_wherever_the_run_was_interrupted() {
+    let home = folder();
+    let device = lengthy(home.path(), "tolerance = 0.065");
+    let whole = home.path().join("whole");
+    finish(&mut device.command("run", &whole));
+    let refined = read_json(&whole.join("refinements.json"));
+    assert_eq!(count(&refined, "/refinements/0/evaluations"), 10, "{refined}");
+    let expected = essence(&files(&whole));
+    for cut in ["9", "10", "11", "12"] {
+        let out = home.path().join(cut);
+        finish(device.command("run", &out).args(["--max-evaluations", cut]));
+        finish(&mut command(&[&"resume", &out, &"--max-evaluations", &"16"]));
+        assert_same(&essence(&files(&out)), &expected, cut);
+    }
 }
 
 /// One error, wherever it is asked for; the map of the field file adds up to it.

@@ -131,7 +131,8 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
     let refused = |place: String, message: String| {
         let key = format!("materials.{name}.bh_file");
         let message = format!("`{}`{place}: {message}", path.display());
-        let expected = "lines of H [A/m], B [T], both ascending, with a comma between them";
+        let expected =
+            "lines of H [A/m], B [T], both ascending, with a comma between them; a header begins with #";
         Box::new(source.diagnostic(&key, message).expected(expected))
     };
     let mut text = String::new();
@@ -140,11 +141,18 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
     let hash = blake3_hex(text.as_bytes());
     let mut lines = Vec::new();
     let mut points = Vec::new();
-    for (number, line) in text.lines().enumerate().filter(|(_, line)| steels::is_row(line)) {
+    // Spreadsheets begin a file with a mark of its encoding.
+    let rows = text.strip_prefix('\u{feff}').unwrap_or(&text).lines().enumerate();
+    for (number, line) in rows.filter(|(_, line)| steels::is_row(line)) {
         let at = |message: &str| refused(format!(", line {}", number + 1), message.to_owned());
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let &[h, b] = fields.as_slice() else {
-            return Err(at(&format!("{} columns, not 2", fields.len())));
+            let separator =
+                [(';', "a semicolon"), ('\t', "a tab")].into_iter().find(|(mark, _)| line.contains(*mark));
+            return Err(at(&match separator {
+                Some((_, name)) => format!("{name} separates the columns, not a comma"),
+                None => format!("{} columns, not 2", fields.len()),
+            }));
         };
         let number_in = |field: &str| {
             field.parse::<f64>().map_err(|_| at(&format!("`{}` is no number", field.escape_debug())))
@@ -177,7 +185,8 @@ mod tests {
         let of_line_5 = [
             ("2000", "1 columns, not 2"),
             ("2000, 1.6, 3", "3 columns, not 2"),
-            ("2000; 1.6", "1 columns, not 2"),
+            ("2000; 1.6", "a semicolon separates the columns"),
+            ("2000\t1.6", "a tab separates the columns"),
             ("2 kA/m, 1.6", "`2 kA/m` is no number"),
             ("2000, -", "`-` is no number"),
             ("nan, 1.6", "not finite"),
@@ -195,7 +204,7 @@ mod tests {
             let is_at_its_line = message.contains("steel.csv`, line 5") && message.contains(word);
             assert!(is_at_its_line, "{line}: {message}");
         }
-        std::fs::write(&table, format!("{HEAD}100000, 2.2\n")).expect("written");
+        std::fs::write(&table, format!("\u{feff}{HEAD}100000, 2.2\n")).expect("written");
         let curves = Curves::read(&config, &source).expect("a sound table");
         assert_eq!(curves.into_files().len(), 1);
     }

@@ -3,7 +3,7 @@
 //! What would be off by more than a tenth is refused, what may be is a warning; both name the key that cures it. The limits are
 //! measured (docs/verification.md, 2.8).
 
-use fluxmorph_geometry::{Mesh, Millimetres};
+use fluxmorph_geometry::{Mesh, Millimetres, Readable};
 use fluxmorph_solver::audit::NodalErrors;
 
 use super::entries::material;
@@ -53,7 +53,7 @@ pub(super) fn faults(
         let message = format!(
             "nodal elements of order {} lose more than a tenth of the flux beside iron of the relative permeability {} (`{}`{}): {}",
             u8::from(config.analysis.order),
-            iron.relative_permeability,
+            Readable(iron.relative_permeability),
             iron.region,
             iron.shielding(),
             limits.wrong
@@ -92,7 +92,9 @@ fn filled_iron<'a>(config: &'a Config, audits: &'a [Audited]) -> impl Iterator<I
             "iron in `{}`, of the relative permeability {} and {:.2} skin depths thick, draws in flux of which nodal elements of \
              order {order} lose a part: its losses in a field along it, and weak fields beside it, may be wrong by a tenth to \
              factors. Set {CURE}",
-            audit.region, audit.relative_permeability, audit.thickness_in_skin_depths
+            audit.region,
+            Readable(audit.relative_permeability),
+            audit.thickness_in_skin_depths
         )
     })
 }
@@ -222,7 +224,7 @@ fn beside_iron(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Option<Strin
             format!(
                 "region `{}` has the relative permeability {}{}, and nodal elements of order {}: {}. Set {CURE}",
                 iron.region,
-                iron.relative_permeability,
+                Readable(iron.relative_permeability),
                 iron.shielding(),
                 u8::from(config.analysis.order),
                 limits.wrong
@@ -234,7 +236,8 @@ fn beside_iron(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Option<Strin
         format!(
             "region `{}` has the relative permeability {}, and edge elements of order 1 have one B an element: in slits and \
              thin walls of it that one or two elements cross B may be off by 10 to 20 %. Refine them, or set analysis.order = 2",
-            iron.region, iron.relative_permeability
+            iron.region,
+            Readable(iron.relative_permeability)
         )
     })
 }

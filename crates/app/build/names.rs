@@ -93,7 +93,11 @@ fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagno
         _ if name.is_empty() => {}
         Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
         Ok(id) if is_empty(topology, id) => {
-            faults.push(source.diagnostic(&path, format!("the region `{name}` has no elements")));
+            let fault = source.diagnostic(&path, format!("the region `{name}` has no elements"));
+            faults.push(fault.expected(
+                "a region with elements; a mesh that a run has written has none where an impedance surface or a perfect conductor \
+                 stood: take the mesh that the run began with",
+            ));
         }
         Ok(_) => {}
     };

@@ -17,6 +17,7 @@ use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup
 use super::entries::{is_air, material};
 use super::outline::same_nodes;
 use super::plausible;
+use super::soundness::unit_warning;
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
 
@@ -254,7 +255,8 @@ pub(super) fn shape(
         faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
     if let Some(thickness) = &thickness {
-        faults.extend(vanishing_faults(source, design, mesh, &surface, thickness));
+        let doubt = unit_warning(config, full_mesh).map_or(String::new(), |doubt| format!("; {doubt}"));
+        faults.extend(vanishing_faults(source, design, mesh, (&surface, thickness), &doubt));
     }
     source.check(faults)?;
     // Unless more is asked for, it is the room of elements that is held.
@@ -280,13 +282,14 @@ pub(super) fn thickened_regions(mesh: &Mesh, surface: &DesignSurface, config: &C
     bodies.into_iter().collect()
 }
 
-/// Refuses bounds at which nothing is left of the body: all variables there, somewhere, take more than its thickness.
+/// Refuses bounds at which nothing is left of the body: all variables there, somewhere, take more than its thickness. What speaks
+/// against the unit of the mesh is said behind it.
 fn vanishing_faults(
     source: &SourceMap,
     design: &Design,
     mesh: &Mesh,
-    surface: &DesignSurface,
-    thickness: &WallThickness,
+    (surface, thickness): (&DesignSurface, &WallThickness),
+    doubt: &str,
 ) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
     for (key, bound) in [("design.lower", design.lower), ("design.upper", design.upper)] {
@@ -306,7 +309,8 @@ fn vanishing_faults(
         );
         let fault = source.diagnostic(key, message);
         let share = bound * thickness / (thickness - least);
-        faults.push(fault.expected(format!("a bound nearer to zero than {:.3} mm", Millimetres(share))));
+        faults
+            .push(fault.expected(format!("a bound nearer to zero than {:.3} mm{doubt}", Millimetres(share))));
     }
     faults
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::tet4::{Point, add};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, Readable, RegionId};
 use fluxmorph_optimizer::problem::{Problem, Shape};
 use fluxmorph_solver::Material;
 use fluxmorph_solver::audit::{SkinAudit, conductor_of, first_layer, skin_audit};
@@ -98,7 +98,9 @@ pub(crate) fn warnings<'a>(audits: impl IntoIterator<Item = &'a Audited>) -> Vec
         let (audited, warning) = of_region.into_iter().max_by(|a, b| badness(a).total_cmp(&badness(b)))?;
         Some(match frequencies.len() {
             1 => warning,
-            count => format!("at {} Hz, the worst of {count} frequencies: {warning}", audited.frequency),
+            count => {
+                format!("at {} Hz, the worst of {count} frequencies: {warning}", Readable(audited.frequency))
+            }
         })
     };
     by_region.into_values().filter_map(worst).collect()

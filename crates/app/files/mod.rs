@@ -69,7 +69,9 @@ pub enum OutputError {
     )]
     NotADirectory { path: PathBuf },
     /// There is no run in a directory.
-    #[error("`{path}` holds no run of fluxmorph: expected a directory that `fluxmorph run` has written into")]
+    #[error(
+        "`{path}` holds no run of fluxmorph: expected a directory that `fluxmorph run` has written into; of a sweep, one of those in it"
+    )]
     NoRun { path: PathBuf },
     /// Another process writes into the directory.
     #[error(

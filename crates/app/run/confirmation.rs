@@ -118,8 +118,8 @@ impl Session<'_> {
             accuracy.refined(refinements);
         }
         let tolerance = self.config.accuracy.tolerance.zip(errors);
-        accuracy.within_tolerance =
-            tolerance.map(|(tolerance, errors)| is_within(tolerance, errors, objective, observer));
+        accuracy.within_tolerance = tolerance
+            .map(|(tolerance, errors)| is_within(tolerance, errors, (objective, stop_reason), observer));
         let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
         let analysis = &self.config.analysis;
         let is_checked = self.is_checked(stop_reason) && objective.ratio != 1.0;
@@ -251,7 +251,7 @@ impl Session<'_> {
 fn is_within(
     tolerance: f64,
     errors: [f64; 2],
-    objective: &ObjectiveResult,
+    (objective, stop_reason): (&ObjectiveResult, StopReason),
     observer: &mut dyn Observer,
 ) -> bool {
     let larger = objective.initial.abs().max(objective.best.abs());
@@ -264,8 +264,15 @@ fn is_within(
         .map(|(design, bar)| format!("{:.3} % for the {design} design", 100.0 * bar))
         .collect();
     if !beyond.is_empty() {
+        let cure = match stop_reason {
+            StopReason::MaxEvaluations => {
+                ": all evaluations were used before a finer mesh; resumed with more of them, the run refines it"
+            }
+            StopReason::MaxTime => ": the time was over before a finer mesh; a resumed run refines it",
+            _ => "",
+        };
         observer.notice(&format!(
-            "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}",
+            "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}{cure}",
             100.0 * tolerance,
             beyond.join(", ")
         ));

@@ -201,6 +201,10 @@ impl Session<'_> {
         let is_refined = Self::is_refined(refinements.as_ref());
         let directory = &self.directory;
         let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
+        if is_refined {
+            // Of a mesh before, where the run had ended on it and is resumed.
+            directory.remove(&directory.optimum())?;
+        }
         exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
         let reason = optimised.stop_reason;

@@ -32,6 +32,6 @@ pub mod topology;
 pub use error::MeshError;
 pub use ids::{CarrierId, ElementId, NodeId, RegionId};
 pub use mesh::Mesh;
-pub use millimetres::{Millimetres, millimetres};
+pub use millimetres::{Millimetres, Readable, millimetres};
 pub use parallel::Partition;
 pub use topology::{Facet, Topology};

@@ -182,7 +182,10 @@ pub enum SolverError {
         failure: NewtonFailure,
     },
     /// A field or objective that is not a finite number.
-    #[error("the {what} is {value}: the field problem has no usable solution")]
+    #[error(
+        "the {what} is {value}: the field problem has no usable solution; check currents, remanence, prescribed fields, weights, \
+         material data and units"
+    )]
     NotFinite { what: &'static str, value: f64 },
     /// A right side whose norm cannot be computed.
     #[error(

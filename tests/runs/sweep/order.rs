@@ -3,6 +3,7 @@
 use std::process::Command;
 
 use super::home::Home;
+use crate::support::device::BLOCK;
 use crate::support::essence::assert_same;
 use crate::support::folder::list;
 use crate::support::program::finish;
@@ -83,6 +84,24 @@ fn all_faults_are_told_before_anything_runs() {
     let told =
         broken.sweep("out", &["--set", "design.upper=1 mm,2 mm,3 mm"]).with(3, &["3 of 3 combinations"]);
     assert_eq!(told.count("--> block.toml"), 1, "{}", told.stderr);
+}
+
+#[test]
+fn a_mesh_file_that_is_missing_is_told_before_anything_runs() {
+    let home = Home::new();
+    let device = &BLOCK[BLOCK.find("[analysis]").expect("an analysis")..];
+    home.write("read.toml", &format!("[mesh]\nfile = \"here.msh\"\nunit = \"mm\"\n{device}"));
+    home.write("here.msh", "");
+    let files = "mesh.file=here.msh,gone.msh";
+    home.fluxmorph(&["sweep", "read.toml", "--out", "out", "--set", files]).with(
+        3,
+        &[
+            "combination `mesh.file=gone.msh`:",
+            "cannot open the mesh `",
+            "1 of 2 combinations cannot be read",
+        ],
+    );
+    assert!(!home.path("out").exists());
 }
 
 #[test]

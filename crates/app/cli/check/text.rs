@@ -187,10 +187,10 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     }
     for Reach { bound, share, cause } in &summary.reach {
         if let Some(cause) = cause {
-            let share = 100.0 * share;
+            let (share, decimals) = (100.0 * share, usize::from(*share < 0.1));
             row(
                 &format!("{bound} bound"),
-                format!("the mesh follows all variables for {share:.0} % of the way there: {cause}"),
+                format!("the mesh follows all variables for {share:.decimals$} % of the way there: {cause}"),
             );
         }
     }

@@ -41,7 +41,8 @@ table! {
         /// Which evaluations leave a VTU file. Default: `"every"`, and `"improved"` where `optimizer.max_evaluations` is above 20,
         /// which the log says.
         fields: FieldsKept = WORD, else FieldsKept::Every;
-        /// Whether the mesh of the optimum is written as a Gmsh file, `optimum.msh`: it is what a user goes on with.
+        /// Whether the mesh of the optimum is written as a Gmsh file, `optimum.msh`: it is what a user goes on with. Regions whose
+        /// surface alone is modelled are not in it.
         mesh: bool = FLAG => true;
         /// Surfaces of the best design that are written as STL files; `[]`: none. Default: the surfaces of `[design]`.
         stl: Vec<String> = NAMES, else Vec::new();

@@ -7,7 +7,7 @@ use super::state::{fingerprint, mesh_file};
 use super::{Combination, Criterion, Setting, SweepError, combinations};
 use crate::build::{memory_limit, with_names};
 use crate::config::{
-    Config, ConfigError, DiagnosticReport, Objective, OutputNamedBy, SourceMap, resolved_toml,
+    Config, ConfigError, Diagnostic, DiagnosticReport, Objective, OutputNamedBy, SourceMap, resolved_toml,
 };
 use crate::error::Error;
 use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex};
@@ -172,7 +172,18 @@ fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, SourceMa
     if request.overwrite == OverwritePolicy::Keep {
         memory_limit::check_mesh(&config, &source)?;
     }
+    if let Some(fault) = missing_mesh(&config, &source) {
+        return Err(source.error(vec![fault]));
+    }
     Ok((config, source))
+}
+
+/// A mesh file that cannot be opened.
+fn missing_mesh(config: &Config, source: &SourceMap) -> Option<Diagnostic> {
+    let path = mesh_file(config)?;
+    let error = std::fs::File::open(path).err()?;
+    let fault = source.diagnostic("mesh.file", format!("cannot open the mesh `{}`: {error}", path.display()));
+    Some(fault.expected("the path of a Gmsh mesh"))
 }
 
 /// Combinations that cannot be read.

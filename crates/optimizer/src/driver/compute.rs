@@ -102,6 +102,7 @@ impl Run<'_> {
     /// Computes a design on its mesh, which took so many seconds.
     fn compute(&mut self, p: &[f64], (moved, before): (&Moved, f64)) -> Result<Sample, Stop> {
         let clock = Instant::now();
+        self.has_computed = true;
         let Self { problem, cache, observer, .. } = self;
         let progress = &mut Watching(&mut **observer);
         let mut analysis = problem.analyse(moved.clone(), Derivatives::Search, cache, progress)?;
@@ -112,7 +113,8 @@ impl Run<'_> {
         let mut record = self.record(p, &initial, &analysis);
         let sample = self.sample(&initial, &record);
         // Before anything of it is kept.
-        sample.check(p.len(), self.constraint_count(), self.member_count())?;
+        let name = |k: usize| format!("the constraint `{}`", self.problem.constraints()[k].name);
+        sample.check(p.len(), (self.constraint_count(), &name), self.member_count())?;
         let comparison = self.compare(objective, &sample);
         record.improved = comparison.is_improved();
         record.row.iteration = self.iterations_after(comparison);

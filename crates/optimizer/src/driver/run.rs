@@ -29,6 +29,8 @@ pub(super) struct Run<'a> {
     pub(super) initial: Option<Initial>,
     /// Whether the design of a coarser mesh is evaluated.
     pub(super) is_taking_up: bool,
+    /// Whether an evaluation is not of before.
+    pub(super) has_computed: bool,
     pub(super) last: Vec<f64>,
     /// What the method has seen of the design before.
     pub(super) latest: Option<Sample>,
@@ -83,6 +85,7 @@ impl<'a> Run<'a> {
             iterations: 0,
             initial: None,
             is_taking_up: false,
+            has_computed: false,
             last,
             latest: None,
             repeated: 0,
@@ -177,8 +180,9 @@ impl<'a> Run<'a> {
             return Some(StopReason::Interrupted);
         }
         let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
-        // Without a first evaluation there would be nothing to keep, and what was computed before is replayed to its end.
-        let must_go_on = self.initial.is_none() || self.is_taking_up;
+        // Without a first evaluation there would be nothing to keep, and what was computed before is replayed to its end. One that is
+        // resumed gets one evaluation further at least, however short its time.
+        let must_go_on = !self.has_computed || self.is_taking_up;
         let is_over = !must_go_on && self.settings.max_time.is_some_and(over) && !self.is_replaying();
         is_over.then_some(StopReason::MaxTime)
     }

@@ -50,8 +50,13 @@ impl Sample {
     ///
     /// # Errors
     /// [`Error::NotFinite`] names the first number that is none, or is beyond every range; [`Error::Optimisation`] where
-    /// there is not one derivative a variable, or another number of constraints or terms of a worst case.
-    pub fn check(&self, variables: usize, constraints: usize, members: usize) -> Result<(), Error> {
+    /// there is not one derivative a variable, or another number of constraints, which have names, or terms of a worst case.
+    pub fn check(
+        &self,
+        variables: usize,
+        (constraints, name): (usize, &dyn Fn(usize) -> String),
+        members: usize,
+    ) -> Result<(), Error> {
         let refuse = |what: String, value: f64| {
             let expected = "expected a finite number below 1e100 after division by the initial design's value; check weights, \
                             bounds of constraints and units";
@@ -86,7 +91,7 @@ impl Sample {
             }
         }
         for (number, (value, gradient)) in self.constraints.iter().enumerate() {
-            let name = format!("constraint {number}, relative to its bound,");
+            let name = format!("{}, relative to its bound,", name(number));
             derivatives(&name, gradient)?;
             if !is_sound(*value) {
                 return refuse(name, *value);
@@ -427,7 +432,8 @@ impl<'a, F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'a, F, E>
             (0..x.len()).map(|k| back(k).clamp(self.settings.lower[k], self.settings.upper[k])).collect();
         let answer = self.guard.call(|| (self.evaluate)(&physical))?;
         Some(answer.and_then(|sample| {
-            sample.check(x.len(), self.settings.constraints, self.settings.members)?;
+            let name = |k: usize| format!("constraint {k}");
+            sample.check(x.len(), (self.settings.constraints, &name), self.settings.members)?;
             Ok(sample)
         }))
     }

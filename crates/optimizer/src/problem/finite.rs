@@ -5,9 +5,9 @@
 //! name, as [`Error::NotFinite`], so that no file holds a `NaN`, an infinity, or the `null` that JSON writes for them. One
 //! pass over unknowns, nodes and variables; docs/robustness.md has what it costs and what a run does then.
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::{Mesh, Readable};
 use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
 
 use crate::constraint::Constraint;
@@ -19,13 +19,13 @@ use crate::problem::Analysis;
 const FIELD: &str = "expected a finite number; check currents, material data and units";
 
 /// What to do about an objective or constraint that is not finite.
-const SUM: &str = "expected a finite number; check weights, currents and units";
+const SUM: &str = "expected a finite number; check weights, currents, frequencies, material data and units";
 
 /// `the state at 60 Hz`, or another problem there.
 pub(crate) fn problem_name(what: &str, model: &FieldModel) -> String {
     let problem = match model.setup().frequency {
         0.0 => format!("{what} of the static field"),
-        frequency => format!("{what} at {frequency} Hz"),
+        frequency => format!("{what} at {} Hz", Readable(frequency)),
     };
     match &model.setup().load_case {
         Some(name) => format!("{problem} under the load `{name}`"),
