@@ -116,7 +116,8 @@ fn a_run_of_an_earlier_version_is_refused_and_may_be_replaced() {
 fn another_configuration_is_refused_and_what_does_not_matter_is_not() {
     let run = begun("out");
     run.edit("config.toml", "b = [0.0, 0.0, 0.1]", "b = [0.0, 0.0, 0.2]");
-    run.is_refused(3, &["journal.jsonl", "another configuration", "restore the config.toml"]);
+    let changed = "`boundaries.uniform_field.b[2]` is not what it was";
+    run.is_refused(3, &["journal.jsonl", "another configuration", "restore the config.toml", changed]);
     run.edit("config.toml", "b = [0.0, 0.0, 0.2]", "b = [0.0, 0.0,");
     run.is_refused(3, &["config.toml"]);
     run.edit("config.toml", "b = [0.0, 0.0,", "b = [0.0, 0.0, 0.1]");

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
 
+use super::changed_key::changed_key;
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
 use super::{Concluded, Options, Session};
@@ -105,7 +106,7 @@ pub(crate) fn resume_held(
         },
     )?;
     let mut session = prepared.session("run", directory.clone(), manifest);
-    let contents = journal(&directory, &session.identity(), observer)?;
+    let contents = journal(&directory, (&session.identity(), &config), observer)?;
     session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);
     session.announce(observer);
     directory.make_fields()?;
@@ -200,12 +201,16 @@ fn advice(result: &RunResult) -> String {
 /// The journal, if it is that of this run.
 fn journal(
     directory: &RunDirectory,
-    now: &Identity,
+    (now, config): (&Identity, &Config),
     observer: &mut dyn RunObserver,
 ) -> Result<Option<Contents>, Error> {
     let Some(contents) = Journal::read(directory)? else { return Ok(None) };
     let path = directory.journal();
-    if let Err(cause) = contents.identity.check(now) {
+    if let Err(mut cause) = contents.identity.check(now) {
+        let is_other = contents.identity.configuration != now.configuration;
+        if let Some(key) = is_other.then(|| changed_key(directory, config)).flatten() {
+            cause += &format!("; `{key}` is not what it was");
+        }
         return Err(Error::OtherRun { path, cause });
     }
     let (count, file) = (contents.records.len(), path.display());
