@@ -197,9 +197,9 @@ fn lengthy(home: &Path, accuracy: &str) -> Device {
     written("block", home, &[EDGES, slow[0], slow[1], longer, ("[analysis]", &accurate)])
 }
 
-/// What is looked at on the way costs the search nothing, and is shown once.
+/// An estimate on the way changes nothing of the search.
 #[test]
-fn a_search_that_pauses_for_an_estimate_goes_on_as_one_that_does_not() {
+fn a_search_goes_on_after_an_estimate_as_one_without() {
     let home = folder();
     let history = |accuracy: &str| {
         let out = home.path().join("out");
@@ -229,7 +229,10 @@ fn a_mesh_is_refined_during_a_search_wherever_the_run_was_interrupted() {
     for cut in ["9", "10", "11", "12"] {
         let out = home.path().join(cut);
         finish(device.command("run", &out).args(["--max-evaluations", cut]));
-        finish(&mut command(&[&"resume", &out, &"--max-evaluations", &"16"]));
+        // One without time for anything refines the mesh, or gets one evaluation further.
+        finish(&mut command(&[&"resume", &out, &"--max-evaluations", &"13", &"--max-time", &"0.001 ms"]))
+            .exits_with(1);
+        finish(&mut command(&[&"resume", &out, &"--max-evaluations", &"16", &"--max-time", &"1 h"]));
         assert_same(&essence(&files(&out)), &expected, cut);
     }
 }

@@ -147,9 +147,9 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
         let at = |message: &str| refused(format!(", line {}", number + 1), message.to_owned());
         let fields: Vec<&str> = line.split(',').map(str::trim).collect();
         let &[h, b] = fields.as_slice() else {
-            let separator =
-                [(';', "a semicolon"), ('\t', "a tab")].into_iter().find(|(mark, _)| line.contains(*mark));
-            return Err(at(&match separator {
+            let marks = [(';', "a semicolon"), ('\t', "a tab"), (' ', "a space")];
+            let separator = marks.into_iter().find(|(mark, _)| line.trim().contains(*mark));
+            return Err(at(&match separator.filter(|_| fields.len() == 1) {
                 Some((_, name)) => format!("{name} separates the columns, not a comma"),
                 None => format!("{} columns, not 2", fields.len()),
             }));
@@ -187,6 +187,7 @@ mod tests {
             ("2000, 1.6, 3", "3 columns, not 2"),
             ("2000; 1.6", "a semicolon separates the columns"),
             ("2000\t1.6", "a tab separates the columns"),
+            ("2000  1.6", "a space separates the columns"),
             ("2 kA/m, 1.6", "`2 kA/m` is no number"),
             ("2000, -", "`-` is no number"),
             ("nan, 1.6", "not finite"),

@@ -66,7 +66,7 @@ impl InitialField {
 impl Session<'_> {
     /// What estimates the errors of this run's analyses.
     pub(super) fn estimator(&self) -> Estimator<'_> {
-        Estimator::new((self.config, self.source), &self.setup)
+        Estimator::new((self.config, self.source), (&self.setup.problem, &self.setup.full_mesh))
     }
 
     /// The estimated errors at the initial and the best design of a run, of which the last is `at_best` where that is known.
@@ -118,8 +118,16 @@ impl Session<'_> {
             accuracy.refined(refinements);
         }
         let tolerance = self.config.accuracy.tolerance.zip(errors);
-        accuracy.within_tolerance = tolerance
-            .map(|(tolerance, errors)| is_within(tolerance, errors, (objective, stop_reason), observer));
+        accuracy.within_tolerance =
+            tolerance.map(|(tolerance, errors)| is_within(tolerance, errors, objective, observer));
+        let at_limit = matches!(stop_reason, StopReason::MaxEvaluations | StopReason::MaxTime);
+        let can_refine = |own: &Refinements| own.refinements.len() < self.config.accuracy.max_refinements;
+        if accuracy.within_tolerance == Some(false) && at_limit && refinements.is_some_and(can_refine) {
+            observer.notice(&format!(
+                "{}: a run that is resumed with more looks at its mesh again",
+                stop_reason.describe()
+            ));
+        }
         let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
         let analysis = &self.config.analysis;
         let is_checked = self.is_checked(stop_reason) && objective.ratio != 1.0;
@@ -251,7 +259,7 @@ impl Session<'_> {
 fn is_within(
     tolerance: f64,
     errors: [f64; 2],
-    (objective, stop_reason): (&ObjectiveResult, StopReason),
+    objective: &ObjectiveResult,
     observer: &mut dyn Observer,
 ) -> bool {
     let larger = objective.initial.abs().max(objective.best.abs());
@@ -264,15 +272,8 @@ fn is_within(
         .map(|(design, bar)| format!("{:.3} % for the {design} design", 100.0 * bar))
         .collect();
     if !beyond.is_empty() {
-        let cure = match stop_reason {
-            StopReason::MaxEvaluations => {
-                ": all evaluations were used before a finer mesh; resumed with more of them, the run refines it"
-            }
-            StopReason::MaxTime => ": the time was over before a finer mesh; a resumed run refines it",
-            _ => "",
-        };
         observer.notice(&format!(
-            "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}{cure}",
+            "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}",
             100.0 * tolerance,
             beyond.join(", ")
         ));

@@ -5,6 +5,7 @@
 //! (`h⁴` and `h^(4/3)`): `F(h/2) − F(h)` is 0.94 to 0.6 of the error, and 4/3 of it between 0.8 and 1.25 times. That costs
 //! eight times the elements, so that it has to be asked for.
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::Constraint;
 use fluxmorph_optimizer::memory_estimate::Sizes;
@@ -13,7 +14,7 @@ use fluxmorph_solver::SolverError;
 use fluxmorph_solver::enrichment::Effort;
 
 use super::finer::{Cut, FinerProblem, looked_at_once};
-use crate::build::{Setup, memory_limit};
+use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, SourceMap};
 use crate::error::Error;
 use crate::show::Observer;
@@ -56,7 +57,9 @@ pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
 pub(crate) struct Estimator<'a> {
     config: &'a Config,
     source: &'a SourceMap,
-    setup: &'a Setup,
+    problem: &'a Problem,
+    /// Of the problem, with all regions.
+    full_mesh: &'a Mesh,
     effort: Effort,
     /// Of first order: the models of second order.
     models: EnrichedModels,
@@ -65,10 +68,13 @@ pub(crate) struct Estimator<'a> {
 }
 
 impl<'a> Estimator<'a> {
-    /// That of a configuration and what was set up of it.
-    pub(crate) fn new((config, source): (&'a Config, &'a SourceMap), setup: &'a Setup) -> Self {
+    /// That of a configuration and what was set up of it: the problem, and its mesh with all regions.
+    pub(crate) fn new(
+        (config, source): (&'a Config, &'a SourceMap),
+        (problem, full_mesh): (&'a Problem, &'a Mesh),
+    ) -> Self {
         let effort = if is_asked_for(config) { Effort::Any } else { Effort::Affordable };
-        Self { config, source, setup, effort, models: EnrichedModels::new(effort), finer: None }
+        Self { config, source, problem, full_mesh, effort, models: EnrichedModels::new(effort), finer: None }
     }
 
     /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
@@ -77,7 +83,7 @@ impl<'a> Estimator<'a> {
         analysis: &Analysis,
         observer: &mut dyn Observer,
     ) -> Option<ErrorEstimate> {
-        let problem = &self.setup.problem;
+        let problem = self.problem;
         if let Some(shortage) = memory_limit::shortage(memory(self.config, problem)?) {
             observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
             return None;
@@ -108,7 +114,7 @@ impl<'a> Estimator<'a> {
             Some(finer) => finer,
             None => {
                 let config = looked_at_once(self.config.clone());
-                FinerProblem::new(&config, self.source, &self.setup.full_mesh, Cut::Halvings(1))?
+                FinerProblem::new(&config, self.source, self.full_mesh, Cut::Halvings(1))?
             }
         };
         let found = self.finer.insert(finer).analyse(&analysis.mesh, &mut SolverCache::default())?;
@@ -118,7 +124,7 @@ impl<'a> Estimator<'a> {
             members => members,
         };
         let errors: Vec<f64> = values(&found).into_iter().zip(values(analysis)).map(error).collect();
-        let problem = &self.setup.problem;
+        let problem = self.problem;
         let of_field = |(_, own): &(usize, &Constraint)| own.quantity.is_of_field();
         let constrained = problem.constraints().iter().enumerate().filter(of_field);
         let of_constraint = |((k, _), fine): ((usize, &Constraint), &Measured)| {

@@ -1,100 +1,154 @@
-//! A run with a tolerance: its mesh is refined before the search, and after it for the best design, until the error bars of the
-//! objective are small enough. A search pauses for an estimate now and then, so that no evaluations are spent on a gain of the mesh.
+//! A run with a tolerance: its mesh is refined before the search, for the best design on the way of a search and at its end, until
+//! the error bars of the objective are small enough.
 //!
 //! Every mesh is a *level*. The journal has the evaluations of all levels one after the other, `refinements.json` the elements
 //! that were marked: a resumed run makes the same meshes again, and what was cut short before its marks were written is
-//! estimated again, with the same bits. Variables mean the same on every level ([`RefinedMesh`]).
+//! estimated again, with the same bits. Variables mean the same on every level ([`RefinedMesh`]). After how many evaluations a
+//! search is looked at does not depend on the limits of the run.
 //!
-//! Does not live here: the estimate and the marks (`fluxmorph_optimizer::problem::ErrorEstimate`), the way of a search from the
-//! best design of the one before (`fluxmorph_optimizer::driver::Start`).
+//! Does not live here: the searches on these meshes (`search`), the estimate and the marks (`fluxmorph_optimizer::problem::ErrorEstimate`), the way of a search from the
+//! best design of the one before (`fluxmorph_optimizer::driver::Start`), and when a search can be looked at
+//! (`fluxmorph_optimizer::driver::Supervisor`).
 
 use std::time::Instant;
 
 use fluxmorph_geometry::ElementId;
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason};
+use fluxmorph_optimizer::driver::{Observer, Standing, StopReason, Supervisor};
 use fluxmorph_optimizer::memory_estimate::Sizes;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, SolverCache};
-use fluxmorph_remesh::Moved;
+use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Problem};
 
 use super::Session;
+use super::estimate::Estimator;
 use super::journal::mesh_hash;
-use super::recorder::DirectoryRecorder;
-use super::replayed::Behind;
 use crate::build::{Mode, RefinedMesh, Setup, memory_limit, remaining_elements, set_up_on};
-use crate::config::ElementOrder;
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{OutputError, RefinementStep, Refinements, relative_bar};
-use crate::show::RunObserver;
+use crate::files::{OutputError, RefinementStep, Refinements, RunDirectory, relative_bar};
 
 /// What came of the wish for a finer mesh.
-enum Refined {
-    Yes,
-    /// The mesh is fine enough.
-    NotNeeded,
-    /// It stays as it is, for a reason that was reported.
+pub(super) enum Refined {
+    /// The problem on the finer mesh.
+    Yes(Box<Setup>),
+    /// The mesh stays as it is: it is fine enough, or cannot be refined, for a reason that was reported.
     No,
-    /// There is nothing left to use it with: what ends the run, and a warning of the tolerance; a signal is none.
+    /// There is nothing left to use a finer mesh with: what ends the run, and a warning of the tolerance; a signal is none.
     OutOf(StopReason, Option<String>),
+}
+
+/// A design with its field, whose error bar is compared with the tolerance.
+pub(super) struct Looked<'a> {
+    pub(super) problem: &'a Problem,
+    pub(super) analysis: &'a Analysis,
+    pub(super) estimate: &'a ErrorEstimate,
+    /// What the error is relative to.
+    pub(super) scale: f64,
+    /// Evaluations of the run so far: 0 before its first search.
+    pub(super) evaluations: usize,
+    /// Whether the time of the run is over.
+    pub(super) is_out_of_time: bool,
 }
 
 /// Evaluations with which a search on a finer mesh begins: of the initial design, and of the best one before it.
 const TAKEN_UP: usize = 2;
 
-/// Evaluations on a mesh after which a search pauses for an estimate the first time; the next times after twice as many each.
-/// Searches take ten to fifteen to converge.
-const FIRST_PAUSE: usize = 10;
+/// Evaluations on a mesh after which a search is looked at the first time; the next times are after twice as many each. Searches
+/// take ten to fifteen to converge.
+const FIRST_LOOK: usize = 10;
 
 /// The time of a run: that of what it computes, refinements included, and not of what it repeats from its journal.
-struct TimeLimit {
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TimeLimit {
     most: Option<f64>,
     since: Instant,
 }
 
 impl TimeLimit {
     /// So many seconds from now.
-    fn starting_now(most: Option<f64>) -> Self {
+    pub(super) fn starting_now(most: Option<f64>) -> Self {
         Self { most, since: Instant::now() }
     }
 
     /// All of it from now.
-    fn restart(&mut self) {
+    pub(super) fn restart(&mut self) {
         self.since = Instant::now();
     }
 
     /// What is left [s]; `None` without a limit.
-    fn left(&self) -> Option<f64> {
+    pub(super) fn left(&self) -> Option<f64> {
         self.most.map(|most| (most - self.since.elapsed().as_secs_f64()).max(0.0))
     }
 
-    fn is_over(&self) -> bool {
+    pub(super) fn is_over(&self) -> bool {
         self.left().is_some_and(|left| left <= 0.0)
     }
 }
 
 /// The mesh of a run with a tolerance.
-pub(super) struct Levels {
+pub(super) struct Levels<'a> {
+    config: &'a Config,
+    source: &'a SourceMap,
+    directory: RunDirectory,
+    interrupted: &'a dyn Fn() -> bool,
+    pub(super) limit: TimeLimit,
     mesh: RefinedMesh,
     /// The refinements so far; behind them, while a run is resumed, those that are still to be made again.
     kept: Refinements,
-    made: usize,
+    pub(super) made: usize,
     tolerance: f64,
     most: usize,
+    /// Evaluations before the search on this mesh.
+    begun: usize,
+    /// After how many evaluations the search was looked at last, and the evaluation of its best design then.
+    looked: Option<[usize; 2]>,
+    /// The problem on the mesh that was refined during a search, until that has ended.
+    pub(super) finer: Option<Box<Setup>>,
 }
 
-/// What all searches of a run have come to.
-pub(super) struct Searched {
-    /// The last search, with the timings of all.
-    pub(super) optimised: Optimised,
-    /// The initial shape on the mesh of the last search.
-    pub(super) first: Moved,
-    /// The estimated error of the best design, where it is known already.
-    pub(super) at_best: Option<ErrorEstimate>,
-    /// How the mesh was refined; `None` without a tolerance.
-    pub(super) refinements: Option<Refinements>,
-}
+impl<'a> Levels<'a> {
+    /// Those of a run that is begun or resumed; `None` without a tolerance.
+    pub(super) fn of(session: &Session<'a>, limit: TimeLimit) -> Result<Option<Self>, Error> {
+        let Session { config, source, interrupted, .. } = *session;
+        let Some(tolerance) = config.accuracy.tolerance else { return Ok(None) };
+        let directory = session.directory.clone();
+        let kept = Refinements::read(&directory)?;
+        Ok(Some(Self {
+            mesh: RefinedMesh::new(config, source, &session.setup.full_mesh)?,
+            config,
+            source,
+            directory,
+            interrupted,
+            limit,
+            kept,
+            made: 0,
+            tolerance,
+            most: config.accuracy.max_refinements,
+            begun: 0,
+            looked: None,
+            finer: None,
+        }))
+    }
 
-impl Levels {
+    /// Whether the run had refined its mesh before it was interrupted.
+    pub(super) fn has_kept(&self) -> bool {
+        !self.kept.refinements.is_empty()
+    }
+
+    /// How the mesh was refined.
+    pub(super) fn into_refinements(self) -> Refinements {
+        Refinements { refinements: self.kept.refinements.into_iter().take(self.made).collect() }
+    }
+
+    /// Begins a search after so many evaluations.
+    pub(super) fn begin(&mut self, evaluations: usize) {
+        (self.begun, self.looked) = (evaluations, None);
+    }
+
+    /// The refinement that the run before its interruption made after so many evaluations.
+    fn next_kept(&self, evaluations: usize) -> Option<&RefinementStep> {
+        self.kept.refinements.get(self.made).filter(|step| step.evaluations == evaluations)
+    }
+
     /// An error bar beside the tolerance, in words.
     fn compared(&self, design: &str, bar: f64) -> String {
         let percent = |share: f64| format!("{:.2} %", 100.0 * share);
@@ -102,210 +156,24 @@ impl Levels {
         format!("the error bar of the {design} design is {bar}, accuracy.tolerance {tolerance}")
     }
 
-    /// Those of a run that is begun or resumed; `None` without a tolerance.
-    fn of(session: &Session<'_>) -> Result<Option<Self>, Error> {
-        let accuracy = &session.config.accuracy;
-        let Some(tolerance) = accuracy.tolerance else { return Ok(None) };
-        let mesh = RefinedMesh::new(session.config, session.source, &session.setup.full_mesh)?;
-        let kept = Refinements::read(&session.directory)?;
-        Ok(Some(Self { mesh, kept, made: 0, tolerance, most: accuracy.max_refinements }))
+    /// The estimated errors of a design on the mesh as it is; `None` where there are none, for which the reason is reported.
+    pub(super) fn estimate(
+        &self,
+        problem: &Problem,
+        analysis: &Analysis,
+        observer: &mut dyn Observer,
+    ) -> Option<ErrorEstimate> {
+        let of_problem = (problem, self.mesh.mesh());
+        Estimator::new((self.config, self.source), of_problem).estimate(analysis, observer)
     }
 
-    /// After how many evaluations a search that has begun after `before` of them pauses, behind those that are `replayed`: where the
-    /// run before its interruption had refined, and else where it would have paused. `None` where nothing would follow.
-    fn pause(&self, before: usize, replayed: usize) -> Option<usize> {
-        let refined = self.kept.refinements.get(self.made).map(|step| step.evaluations);
-        let pauses = std::iter::successors(Some(FIRST_PAUSE), |pause| pause.checked_mul(2));
-        let next = || pauses.map(|pause| before + pause).find(|pause| *pause >= before + replayed);
-        if self.made < self.most { refined.or_else(next) } else { None }
-    }
-
-    /// The refinement that the run before its interruption made after so many evaluations.
-    fn next_kept(&self, evaluations: usize) -> Option<RefinementStep> {
-        self.kept.refinements.get(self.made).filter(|step| step.evaluations == evaluations).cloned()
-    }
-}
-
-impl Session<'_> {
-    /// Whether its mesh is not that of the configuration any more.
-    pub(super) fn is_refined(refinements: Option<&Refinements>) -> bool {
-        refinements.is_some_and(|refinements| !refinements.refinements.is_empty())
-    }
-
-    /// Searches on one mesh after the other.
-    ///
-    /// # Errors
-    /// As [`driver::optimise`], and what the analysis of a design fails with.
-    pub(super) fn search(
+    /// Refines the mesh where a design needs it; whether it was refined. Why not is reported.
+    pub(super) fn refine(
         &mut self,
-        recorder: &mut DirectoryRecorder,
-        observer: &mut dyn RunObserver,
-    ) -> Result<Searched, Error> {
-        let settings = self.config.optimizer.settings();
-        let mut levels = Levels::of(self)?;
-        let is_shared_out = self.setup.problem.share().is_some();
-        if levels.is_some() && is_shared_out {
-            observer.warning("accuracy.tolerance needs one process: the mesh of this run is not refined");
-        }
-        // Of second order the set-up has said it.
-        levels = levels.filter(|_| !is_shared_out && self.config.analysis.order == ElementOrder::Linear);
-        let mut limit = TimeLimit::starting_now(settings.max_time);
-        if let Some(levels) = &mut levels {
-            self.refine_before_search(levels, recorder.is_replaying(), &mut limit, observer)?;
-        }
-        let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
-        start.pause = levels.as_ref().and_then(|own| own.pause(0, recorder.replayed_of(start.level)));
-        let mut before: Option<Optimised> = None;
-        // Evaluations of a search that goes on after a pause.
-        let mut seen = 0;
-        loop {
-            if recorder.is_replaying() && seen == 0 {
-                limit.restart();
-            }
-            let first = self.setup.problem.moved(self.initial_design())?;
-            let settings = Settings { max_time: limit.left(), ..settings.clone() };
-            let optimised = driver::optimise_from(
-                &start,
-                &mut self.setup.problem,
-                &settings,
-                &mut Behind { observer, seen },
-                recorder,
-                self.interrupted,
-            )?;
-            let (refined, at_best) = match &mut levels {
-                Some(levels) => self.refine_after_search(levels, &optimised, &limit, observer)?,
-                None => (Refined::No, None),
-            };
-            let is_refined = matches!(refined, Refined::Yes);
-            let is_paused = optimised.stop_reason == StopReason::Paused;
-            if is_paused && matches!(refined, Refined::NotNeeded | Refined::No) {
-                seen = optimised.evaluations - start.evaluations;
-                let wants_more = levels.as_ref().filter(|_| matches!(refined, Refined::NotNeeded));
-                start.pause = wants_more.and_then(|own| own.pause(start.evaluations, seen + 1));
-                recorder.rewind(start.level)?;
-                continue;
-            }
-            let mut optimised = sum(before.take(), optimised);
-            if let Refined::OutOf(reason, warning) = refined {
-                warning.iter().for_each(|warning| observer.warning(warning));
-                optimised.warnings.extend(warning);
-                optimised.stop_reason = reason;
-            }
-            if !is_refined {
-                let refinements = levels.map(|levels| levels.kept);
-                return Ok(Searched { optimised, first, at_best, refinements });
-            }
-            start = Start {
-                level: start.level + 1,
-                evaluations: optimised.evaluations,
-                iterations: optimised.iterations,
-                design: Some(optimised.best.values.clone()),
-                pause: None,
-            };
-            let replayed = recorder.replayed_of(start.level);
-            start.pause = levels.as_ref().and_then(|own| own.pause(start.evaluations, replayed));
-            (before, seen) = (Some(optimised), 0);
-        }
-    }
-
-    /// Ends a run before its next evaluation once a signal came.
-    fn check_interrupted(&self) -> Result<(), OptimizerError> {
-        OptimizerError::check_interrupted(self.interrupted).map_err(|_| OptimizerError::InterruptedRun)
-    }
-
-    /// Refines the mesh until the error bar of the initial design is within the tolerance, or the time is over.
-    fn refine_before_search(
-        &mut self,
-        levels: &mut Levels,
-        has_begun: bool,
-        limit: &mut TimeLimit,
-        observer: &mut dyn RunObserver,
-    ) -> Result<(), Error> {
-        loop {
-            self.check_interrupted()?;
-            if let Some(step) = levels.next_kept(0) {
-                self.refine_again(levels, &step)?;
-                limit.restart();
-                continue;
-            }
-            if has_begun {
-                return Ok(());
-            }
-            if limit.is_over() {
-                observer.warning(
-                    "optimizer.max_time is over before the mesh is fine enough for accuracy.tolerance: the initial design is \
-                     evaluated on the mesh as it is, from which a resumed run goes on",
-                );
-                return Ok(());
-            }
-            observer.phase("solving the field of the initial design");
-            let problem = &self.setup.problem;
-            let (moved, cache) = (problem.moved(self.initial_design())?, &mut SolverCache::default());
-            let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
-            self.check_interrupted()?;
-            let Some(estimate) = self.estimator().estimate(&analysis, observer) else {
-                observer.warning("without an estimated error the mesh is not refined to accuracy.tolerance");
-                return Ok(());
-            };
-            let scale = analysis.objective.map_or(f64::NAN, f64::abs);
-            let of_initial = (&analysis, &estimate, scale);
-            match self.refine(levels, (0, limit), of_initial, observer)? {
-                Refined::Yes => {}
-                Refined::NotNeeded | Refined::No => return Ok(()),
-                Refined::OutOf(_, warning) => {
-                    warning.iter().for_each(|warning| observer.warning(warning));
-                    return Ok(());
-                }
-            }
-        }
-    }
-
-    /// Refines the mesh for the best design, where its error bar is beyond the tolerance and there is time to go on: whether it
-    /// was, and the estimate where it was made.
-    fn refine_after_search(
-        &mut self,
-        levels: &mut Levels,
-        optimised: &Optimised,
-        limit: &TimeLimit,
-        observer: &mut dyn RunObserver,
-    ) -> Result<(Refined, Option<ErrorEstimate>), Error> {
-        let reason = optimised.stop_reason;
-        let is_over = matches!(
-            reason,
-            StopReason::MaxEvaluations
-                | StopReason::MaxTime
-                | StopReason::Interrupted
-                | StopReason::NumericalFailure
-        );
-        if is_over {
-            return Ok((Refined::No, None));
-        }
-        if (self.interrupted)() {
-            return Ok((Refined::OutOf(StopReason::Interrupted, None), None));
-        }
-        if let Some(step) = levels.next_kept(optimised.evaluations) {
-            self.refine_again(levels, &step)?;
-            return Ok((Refined::Yes, None));
-        }
-        let analysis = &optimised.best.analysis;
-        let Some(estimate) = self.estimator().estimate(analysis, observer) else {
-            return Ok((Refined::No, None));
-        };
-        let scale = optimised.initial.abs().max(optimised.best.objective.abs());
-        let of_best = (analysis, &estimate, scale);
-        let refined = self.refine(levels, (optimised.evaluations, limit), of_best, observer)?;
-        let estimate = Some(estimate).filter(|_| !matches!(refined, Refined::Yes));
-        Ok((refined, estimate))
-    }
-
-    /// Refines the mesh where a design needs it, for an error relative to `scale`; whether it was refined. Why not is reported.
-    fn refine(
-        &mut self,
-        levels: &mut Levels,
-        (evaluations, limit): (usize, &TimeLimit),
-        (analysis, estimate, scale): (&Analysis, &ErrorEstimate, f64),
-        observer: &mut dyn RunObserver,
+        looked: &Looked<'_>,
+        observer: &mut dyn Observer,
     ) -> Result<Refined, Error> {
+        let &Looked { problem, analysis, estimate, scale, evaluations, is_out_of_time } = looked;
         let objective = analysis.objective.unwrap_or(f64::NAN);
         let what = if evaluations == 0 { "initial" } else { "best" };
         let Some(bar) = relative_bar(estimate.objective, scale) else {
@@ -314,21 +182,21 @@ impl Session<'_> {
             ));
             return Ok(Refined::No);
         };
-        let said = levels.compared(what, bar);
-        if bar <= levels.tolerance {
+        let said = self.compared(what, bar);
+        if bar <= self.tolerance {
             observer.note(&format!("{said}: the mesh is fine enough"));
-            return Ok(Refined::NotNeeded);
+            return Ok(Refined::No);
         }
-        if levels.made >= levels.most {
+        if self.made >= self.most {
             observer.warning(&format!(
                 "{said}, and all {} refinements are used: the tolerance is not kept; allow more accuracy.max_refinements, or \
                  begin with a finer mesh",
-                levels.most
+                self.most
             ));
             return Ok(Refined::No);
         }
         let is_used_up = evaluations > 0 && evaluations + TAKEN_UP > self.config.optimizer.max_evaluations;
-        let over = [(is_used_up, StopReason::MaxEvaluations), (limit.is_over(), StopReason::MaxTime)];
+        let over = [(is_used_up, StopReason::MaxEvaluations), (is_out_of_time, StopReason::MaxTime)];
         if let Some((_, reason)) = over.into_iter().find(|(is_over, _)| *is_over) {
             let left =
                 if reason == StopReason::MaxTime { "there is no time" } else { "too few evaluations are" };
@@ -339,18 +207,19 @@ impl Session<'_> {
             return Ok(Refined::OutOf(StopReason::Interrupted, None));
         }
         observer.phase("refining the mesh");
-        let full = levels.mesh.mesh().topology();
+        let full = self.mesh.mesh().topology();
         let in_full = remaining_elements(self.config, full);
         let marked: Vec<ElementId> =
-            estimate.marked(1.0 - levels.tolerance / bar).into_iter().map(|e| in_full[e.index()]).collect();
+            estimate.marked(1.0 - self.tolerance / bar).into_iter().map(|e| in_full[e.index()]).collect();
         if marked.is_empty() {
             observer.warning(&format!("{said}, and no element has a share in it: the tolerance is not kept"));
             return Ok(Refined::No);
         }
         let tets = full.tets().len();
-        match self.refined(&levels.mesh, &marked) {
+        let setup = match self.refined(problem, &marked) {
             Ok((mesh, setup)) => {
-                (levels.mesh, self.setup) = (mesh, setup);
+                self.mesh = mesh;
+                setup
             }
             Err(cause) => {
                 observer.warning(&format!(
@@ -358,56 +227,57 @@ impl Session<'_> {
                 ));
                 return Ok(Refined::No);
             }
-        }
-        levels.made += 1;
-        levels.kept.refinements.truncate(levels.made - 1);
-        levels.kept.refinements.push(RefinementStep {
+        };
+        self.kept.refinements.truncate(self.made);
+        self.made += 1;
+        self.kept.refinements.push(RefinementStep {
             evaluations,
             tets,
             objective,
             error_estimate: estimate.objective,
-            blake3: mesh_hash(levels.mesh.mesh()),
+            blake3: mesh_hash(self.mesh.mesh()),
             marked: marked.into_iter().map(ElementId::index).collect(),
         });
-        levels.kept.write(&self.directory)?;
+        self.kept.write(&self.directory)?;
         observer.note(&format!(
             "{said}: refinement {}, {tets} → {} tetrahedra",
-            levels.made,
-            levels.mesh.mesh().topology().tets().len()
+            self.made,
+            self.mesh.mesh().topology().tets().len()
         ));
-        Ok(Refined::Yes)
+        Ok(Refined::Yes(Box::new(setup)))
     }
 
-    /// Makes a refinement of before the interruption again.
-    fn refine_again(&mut self, levels: &mut Levels, step: &RefinementStep) -> Result<(), Error> {
+    /// Makes the next refinement of before the interruption again, if it was made after so many evaluations.
+    pub(super) fn refine_again(&mut self, evaluations: usize) -> Result<Option<Box<Setup>>, Error> {
+        let Some(step) = self.next_kept(evaluations) else { return Ok(None) };
         let damaged = |message: &str| {
             let message = format!("{message} (without the file `resume` estimates the errors anew)");
             Error::from(OutputError::Damaged { path: self.directory.refinements(), message })
         };
-        let tets = levels.mesh.mesh().topology().tets().len();
+        let tets = self.mesh.mesh().topology().tets().len();
         if step.marked.iter().any(|&e| e >= tets) {
             return Err(damaged("it names an element that the mesh does not have"));
         }
         let marked: Vec<ElementId> = step.marked.iter().copied().map(ElementId::new).collect();
-        let mut mesh = levels.mesh.clone();
+        let mut mesh = self.mesh.clone();
         mesh.halve(&marked)?;
         if mesh_hash(mesh.mesh()) != step.blake3 {
             return Err(damaged("it makes another mesh than it says"));
         }
-        self.setup = self.set_up(&mesh)?;
-        (levels.mesh, levels.made) = (mesh, levels.made + 1);
-        Ok(())
+        let setup = self.set_up(&mesh)?;
+        (self.mesh, self.made) = (mesh, self.made + 1);
+        Ok(Some(Box::new(setup)))
     }
 
     /// A finer mesh, and the problem on it; else why there is none.
-    fn refined(&self, mesh: &RefinedMesh, marked: &[ElementId]) -> Result<(RefinedMesh, Setup), String> {
-        let mut finer = mesh.clone();
+    fn refined(&self, problem: &Problem, marked: &[ElementId]) -> Result<(RefinedMesh, Setup), String> {
+        let mut finer = self.mesh.clone();
         finer.halve(marked).map_err(|error| error.to_string())?;
         let count = |mesh: &RefinedMesh| mesh.mesh().topology().tets().len() as f64;
-        let growth = count(&finer) / count(mesh);
+        let growth = count(&finer) / count(&self.mesh);
         let too_large =
             |shortage: String| Err(format!("the problem on {} tetrahedra takes {shortage}", count(&finer)));
-        let [least, _] = Sizes::of(&self.setup.problem).on_other_mesh(growth);
+        let [least, _] = Sizes::of(problem).on_other_mesh(growth);
         if let Some(shortage) = memory_limit::shortage(least) {
             return too_large(shortage);
         }
@@ -424,10 +294,50 @@ impl Session<'_> {
     }
 }
 
-/// The last search, with what those before it took.
-fn sum(before: Option<Optimised>, last: Optimised) -> Optimised {
-    let Some(before) = before else { return last };
-    let mut timings = before.timings;
-    timings += last.timings;
-    Optimised { timings, worst_residual: before.worst_residual.max(last.worst_residual), ..last }
+impl Supervisor for Levels<'_> {
+    fn had_ended(&self, evaluations: usize) -> bool {
+        self.next_kept(evaluations).is_some()
+    }
+
+    fn is_due(&self, evaluations: usize) -> bool {
+        let looks = std::iter::successors(Some(FIRST_LOOK), |look| look.checked_mul(2));
+        let mut looks = looks.map(|look| self.begun + look).take_while(|look| *look <= evaluations);
+        let was_looked_at = self.looked.is_some_and(|[after, _]| after == evaluations);
+        self.made < self.most && !was_looked_at && looks.any(|look| look == evaluations)
+    }
+
+    fn look(
+        &mut self,
+        standing: &Standing<'_>,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<StopReason>, OptimizerError> {
+        let &Standing { problem, evaluations, initial, best_evaluation, best, computed } = standing;
+        let before = self.looked.replace([evaluations, best_evaluation]);
+        if before.is_some_and(|[_, best]| best == best_evaluation) {
+            return Ok(None);
+        }
+        let Some(estimate) = self.estimate(problem, best, observer) else { return Ok(None) };
+        let refined = self.refine(
+            &Looked {
+                problem,
+                analysis: best,
+                estimate: &estimate,
+                scale: initial.abs().max(best.objective.map_or(0.0, f64::abs)),
+                evaluations,
+                is_out_of_time: computed > 0 && self.limit.is_over(),
+            },
+            observer,
+        );
+        Ok(match refined? {
+            Refined::Yes(setup) => {
+                self.finer = Some(setup);
+                Some(StopReason::Superseded)
+            }
+            Refined::No => None,
+            Refined::OutOf(reason, warning) => {
+                warning.iter().for_each(|warning| observer.warning(warning));
+                Some(reason)
+            }
+        })
+    }
 }

@@ -19,9 +19,9 @@ pub mod morph;
 mod pieces;
 mod prepared;
 mod recorder;
-mod replayed;
 mod reservations;
 mod resume;
+mod search;
 pub mod shape_pair;
 mod solve;
 mod summary;
@@ -39,11 +39,11 @@ use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use journal::{Identity, Journal};
-use levels::Searched;
 use mesh_independence::{Check, FreshMesh, MeshIndependence};
 use pieces::SharedPieces;
 use prepared::Prepared;
 use recorder::DirectoryRecorder;
+use search::Searched;
 use shape_pair::ShapePair;
 
 use crate::build::locate_error::attribute_error;
@@ -202,11 +202,11 @@ impl Session<'_> {
         let is_refined = Self::is_refined(refinements.as_ref());
         let directory = &self.directory;
         let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
+        exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         if is_refined {
-            // Of a mesh before, where the run had ended on it and is resumed.
+            // Of a mesh before, where the run had ended on it and was resumed.
             directory.remove(&directory.optimum())?;
         }
-        exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
         let reason = optimised.stop_reason;
         let (initial, first) = self.initial_states(first, (best, reason), observer)?;

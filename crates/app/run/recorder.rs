@@ -69,18 +69,6 @@ impl DirectoryRecorder {
         !self.replayed.is_empty()
     }
 
-    /// Evaluations on the mesh after so many refinements that are still to be replayed.
-    pub(super) fn replayed_of(&self, level: usize) -> usize {
-        self.replayed.iter().filter(|record| record.row.level == level).count()
-    }
-
-    /// Replays the evaluations after so many refinements, the last ones of the journal, once more.
-    pub(super) fn rewind(&mut self, level: usize) -> Result<(), Error> {
-        self.replayed = Journal::read_records(&self.directory)?.into();
-        self.replayed.retain(|record| record.row.level == level);
-        Ok(())
-    }
-
     /// Writes the field of the best design with what each element adds to its estimated error, where fields are kept.
     pub(super) fn write_error(
         &self,

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
-use fluxmorph_geometry::{ElementId, Mesh, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, Readable, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::audit::weighted_median;
 use fluxmorph_solver::bh::peak;
@@ -86,10 +86,11 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
                 let (part, cure) = if is_surface { ("its surface", "Mesh the region and give") } else { ("it", "Give") };
                 let (highest, place) = found.highest;
                 format!(
-                    "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {frequency} Hz{under}, at {}, and \
+                    "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {} Hz{under}, at {}, and \
                      {:.1} % of {part} are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
                      that of a material that does not exist. {cure} the material its curve (bh), lower the ampere-turns, or \
                      give the iron more section",
+                    Readable(frequency),
                     millimetres(place),
                     100.0 * found.beyond / found.whole
                 )

@@ -1,6 +1,7 @@
 //! What the result of a run and that of a single analysis have in common: the best design, its mesh, losses and probes.
 
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
@@ -42,7 +43,10 @@ impl Session<'_> {
     ) -> Result<RunResult, Error> {
         let problem = &self.setup.problem;
         let mesh = &analysis.mesh;
+        let clock = Instant::now();
         let terminals = all_terminals(problem, analysis)?;
+        let mut timings_s = self.timings_result(timings);
+        timings_s.insert("terminals".to_owned(), clock.elapsed().as_secs_f64());
         let mut states = self.state_results(analysis, observer);
         for (index, (state, terminals)) in states.iter_mut().zip(&terminals).enumerate() {
             self.complete(index, analysis, terminals, state)?;
@@ -86,7 +90,7 @@ impl Session<'_> {
             inductance_h,
             multipoles,
             linear_solver: linear_solver(problem, analysis, analysis.worst_residual),
-            timings_s: self.timings_result(timings),
+            timings_s,
             warnings,
             peak_memory_bytes: peak_memory_bytes(),
         })

@@ -87,7 +87,7 @@ fn all_faults_are_told_before_anything_runs() {
 }
 
 #[test]
-fn a_mesh_file_that_is_missing_is_told_before_anything_runs() {
+fn a_mesh_file_that_is_missing_is_reported_before_anything_runs() {
     let home = Home::new();
     let device = &BLOCK[BLOCK.find("[analysis]").expect("an analysis")..];
     home.write("read.toml", &format!("[mesh]\nfile = \"here.msh\"\nunit = \"mm\"\n{device}"));

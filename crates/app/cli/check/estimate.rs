@@ -71,7 +71,8 @@ pub(super) fn of_initial_design(
     let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
     let analysis = setup.problem.analyse(moved, Derivatives::None, cache, stages)?;
     let mut listening = Listening { observer, notices: Vec::new() };
-    let estimated = Estimator::new((&config, source), &setup).estimate(&analysis, &mut listening);
+    let estimated = Estimator::new((&config, source), (&setup.problem, &setup.full_mesh))
+        .estimate(&analysis, &mut listening);
     let mut notices = listening.notices;
     if analysis.objective.is_none() {
         notices.push("there is no [objective] whose error could be estimated".to_owned());

@@ -13,9 +13,9 @@ table! {
     ///
     /// With `tolerance` the mesh of a run is refined where its objective needs it: at the initial design until the error bar
     /// there, twice the estimate, is within the tolerance; then comes the search; and where the error bar at the best design is
-    /// not, the mesh is refined for that design, and the search goes on from it. That is looked at where a search ends, and on the
-    /// way after 10, 20, 40 … evaluations on a mesh: what a search gains from the errors of a mesh it would not give back by itself,
-    /// and where the mesh is fine enough it goes on as if nothing had been. Nodes are put in the middle of edges: bodies,
+    /// not, the mesh is refined for that design, and the search goes on from it. That is estimated where a search ends, and on the
+    /// way after 10, 20, 40 … evaluations on a mesh, since a search would not give back by itself what it gains from the errors of a
+    /// mesh; where that is fine enough, the search is the same as without. Nodes are put in the middle of edges: bodies,
     /// facets and design variables stay what they are, `design.filter_radius` and `design.grid` too. All evaluations have one
     /// history, in which `level` counts the refinements, and `optimizer.max_evaluations` limits them together, as `max_time` does,
     /// in which the refinements count. Of the initial design every mesh has its own value, to which the ratios belong. Where the

@@ -1,5 +1,6 @@
 //! `[analysis]`: which field problems are solved, and how exactly.
 
+use fluxmorph_geometry::Readable;
 use serde::Serialize;
 
 use super::linear_solver::{LinearSolver, SolverMethod};
@@ -158,7 +159,7 @@ impl Group for Frequencies {
         // A list with a fault is not handed out.
         let several = written.frequencies.unwrap_or_else(|| vec![f64::NAN]);
         if let Some(twice) = (1..several.len()).find(|&k| several[..k].contains(&several[k])) {
-            let message = format!("`analysis.frequencies` has {} Hz twice", several[twice]);
+            let message = format!("`analysis.frequencies` has {} Hz twice", Readable(several[twice]));
             section.wrong(&format!("frequencies[{twice}]"), message, "each frequency once");
         }
         Self::Several(several)

@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use fluxmorph_geometry::io::open_regular;
+
 use super::state::{fingerprint, mesh_file};
 use super::{Combination, Criterion, Setting, SweepError, combinations};
 use crate::build::{memory_limit, with_names};
@@ -181,7 +183,7 @@ fn read(request: &Request<'_>, overrides: &[String]) -> Result<(Config, SourceMa
 /// A mesh file that cannot be opened.
 fn missing_mesh(config: &Config, source: &SourceMap) -> Option<Diagnostic> {
     let path = mesh_file(config)?;
-    let error = std::fs::File::open(path).err()?;
+    let error = open_regular(path).err()?;
     let fault = source.diagnostic("mesh.file", format!("cannot open the mesh `{}`: {error}", path.display()));
     Some(fault.expected("the path of a Gmsh mesh"))
 }

@@ -102,7 +102,7 @@ impl Run<'_> {
     /// Computes a design on its mesh, which took so many seconds.
     fn compute(&mut self, p: &[f64], (moved, before): (&Moved, f64)) -> Result<Sample, Stop> {
         let clock = Instant::now();
-        self.has_computed = true;
+        self.computed += 1;
         let Self { problem, cache, observer, .. } = self;
         let progress = &mut Watching(&mut **observer);
         let mut analysis = problem.analyse(moved.clone(), Derivatives::Search, cache, progress)?;

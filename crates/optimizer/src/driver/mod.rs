@@ -18,8 +18,8 @@
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
-//! * On a finer mesh a search goes on from the best design of the one before (`start`). A search may pause, to be looked at, and goes
-//!   on by a replay of what it has.
+//! * On a finer mesh a search goes on from the best design of the one before (`start`). A supervisor looks at
+//!   a search between two evaluations, and may end it for that (`supervisor`).
 //! * Limits of evaluations and time are checked before the mesh of each evaluation but the first: what was
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
 //!   then there is nothing new to keep.
@@ -41,6 +41,7 @@ mod settings;
 mod start;
 mod stop;
 mod stop_reason;
+mod supervisor;
 mod trust_region;
 
 use crate::error::Error;
@@ -54,6 +55,7 @@ pub use recorder::{Recorder, Unrecorded};
 pub use settings::Settings;
 pub use start::Start;
 pub use stop_reason::StopReason;
+pub use supervisor::{Standing, Supervisor, Unsupervised};
 
 use run::Run;
 use search::{NextStep, Search};
@@ -76,10 +78,11 @@ pub fn optimise(
     recorder: &mut dyn Recorder,
     interrupted: &dyn Fn() -> bool,
 ) -> Result<Optimised, Error> {
-    optimise_from(&Start::default(), problem, settings, observer, recorder, interrupted)
+    let start = &Start::default();
+    optimise_from(start, problem, settings, observer, (recorder, &mut Unsupervised), interrupted)
 }
 
-/// As [`optimise`], with what a search on a coarser mesh has left.
+/// As [`optimise`], with what a search on a coarser mesh has left, under a supervisor.
 ///
 /// # Errors
 /// As [`optimise`].
@@ -91,10 +94,11 @@ pub fn optimise_from(
     problem: &mut Problem,
     settings: &Settings,
     observer: &mut dyn Observer,
-    recorder: &mut dyn Recorder,
+    (recorder, supervisor): (&mut dyn Recorder, &mut dyn Supervisor),
     interrupted: &dyn Fn() -> bool,
 ) -> Result<Optimised, Error> {
-    let mut run = Run::new(problem, settings, observer, recorder, interrupted).taking_over(start);
+    let run = Run::new(problem, settings, observer, (recorder, supervisor), interrupted);
+    let mut run = run.taking_over(start);
     let reason = match run.take_up(start.design.as_deref()) {
         Ok(None) => search(&mut run, settings)?,
         Ok(Some(reason)) => reason,

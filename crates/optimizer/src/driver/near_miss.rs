@@ -149,7 +149,6 @@ impl Run<'_> {
                 Some(StopReason::Interrupted) => return Ok(Some(StopReason::Interrupted)),
                 Some(_) => return Ok(Some(reason)),
                 None if self.evaluations >= self.settings.max_evaluations => return Ok(Some(reason)),
-                None if self.is_paused() => return Ok(Some(StopReason::Paused)),
                 None => {}
             }
         }

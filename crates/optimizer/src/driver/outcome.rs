@@ -26,6 +26,8 @@ pub struct Optimised {
     pub stop_reason: StopReason,
     /// Number of evaluations.
     pub evaluations: usize,
+    /// Of these, the ones that were computed, and not replayed.
+    pub computed: usize,
     /// Evaluations that improved on the best before them.
     pub iterations: usize,
     /// The objective at the start.

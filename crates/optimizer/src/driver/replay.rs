@@ -5,10 +5,10 @@ use std::time::Instant;
 use super::incumbent::{BestField, Incumbent};
 use super::run::Run;
 use super::stop::Stop;
-use super::{Best, Record, StopReason};
+use super::{Best, Observer, Record, StopReason};
 use crate::error::Error;
 use crate::nlopt::Sample;
-use crate::problem::{Derivatives, NoProgress, SolverCache};
+use crate::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
 
 /// Largest difference of a design to that of its record, relative to the largest variable, where the work of either is or was
 /// shared out: sums over ranks have no fixed last bits. Well above what they leave,
@@ -75,10 +75,35 @@ impl Run<'_> {
         let analysis = match field {
             BestField::Computed(analysis) => *analysis,
             BestField::Replayed(mut cache) => {
-                self.observer.phase("computing the field of the best design");
-                self.problem.evaluate(&values, Derivatives::Search, &mut cache, &mut NoProgress)?
+                computed_again(&values, &mut cache, self.problem, self.observer)?
             }
         };
         Ok(Best { evaluation, values, objective, violation, analysis })
     }
+}
+
+impl Incumbent {
+    /// Computes its field where it was replayed.
+    pub(super) fn compute_field(
+        &mut self,
+        problem: &Problem,
+        observer: &mut dyn Observer,
+    ) -> Result<(), Error> {
+        if let BestField::Replayed(cache) = &mut self.field {
+            let analysis = computed_again(&self.values, cache, problem, observer)?;
+            self.field = BestField::Computed(Box::new(analysis));
+        }
+        Ok(())
+    }
+}
+
+/// The field of a design that was computed before the run was interrupted.
+fn computed_again(
+    values: &[f64],
+    cache: &mut SolverCache,
+    problem: &Problem,
+    observer: &mut dyn Observer,
+) -> Result<Analysis, Error> {
+    observer.phase("computing the field of the best design");
+    problem.evaluate(values, Derivatives::Search, cache, &mut NoProgress)
 }

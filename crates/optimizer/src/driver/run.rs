@@ -7,7 +7,7 @@ use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::near_miss::NearMiss;
 use super::promised_gain::promised_gain;
 use super::stop::Stop;
-use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason};
+use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason, Supervisor};
 use crate::error::Error;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::{Combination, Goal};
@@ -22,6 +22,7 @@ pub(super) struct Run<'a> {
     pub(super) cache: SolverCache,
     pub(super) observer: &'a mut dyn Observer,
     pub(super) recorder: &'a mut dyn Recorder,
+    pub(super) supervisor: &'a mut dyn Supervisor,
     pub(super) interrupted: &'a dyn Fn() -> bool,
     pub(super) clock: Instant,
     pub(super) evaluations: usize,
@@ -29,8 +30,8 @@ pub(super) struct Run<'a> {
     pub(super) initial: Option<Initial>,
     /// Whether the design of a coarser mesh is evaluated.
     pub(super) is_taking_up: bool,
-    /// Whether an evaluation is not of before.
-    pub(super) has_computed: bool,
+    /// Evaluations that were not replayed.
+    pub(super) computed: usize,
     pub(super) last: Vec<f64>,
     /// What the method has seen of the design before.
     pub(super) latest: Option<Sample>,
@@ -55,8 +56,6 @@ pub(super) struct Run<'a> {
     pub(super) level: usize,
     /// Evaluations on coarser meshes.
     pub(super) first_evaluation: usize,
-    /// Evaluations after which the search pauses.
-    pause: Option<usize>,
     /// Whether several ranks compute, or computed what is replayed.
     pub(super) is_shared_out: bool,
 }
@@ -66,7 +65,7 @@ impl<'a> Run<'a> {
         problem: &'a mut Problem,
         settings: &'a Settings,
         observer: &'a mut dyn Observer,
-        recorder: &'a mut dyn Recorder,
+        (recorder, supervisor): (&'a mut dyn Recorder, &'a mut dyn Supervisor),
         interrupted: &'a dyn Fn() -> bool,
     ) -> Self {
         let goal = problem.objective().expect("an optimisation has an objective").goal;
@@ -79,13 +78,14 @@ impl<'a> Run<'a> {
             cache: SolverCache::default(),
             observer,
             recorder,
+            supervisor,
             interrupted,
             clock: Instant::now(),
             evaluations: 0,
             iterations: 0,
             initial: None,
             is_taking_up: false,
-            has_computed: false,
+            computed: 0,
             last,
             latest: None,
             repeated: 0,
@@ -100,15 +100,14 @@ impl<'a> Run<'a> {
             stepping_back: None,
             level: 0,
             first_evaluation: 0,
-            pause: None,
             is_shared_out,
         }
     }
 
     /// Goes on counting where a search on a coarser mesh ended.
     pub(super) fn taking_over(self, start: &Start) -> Self {
-        let Start { level, evaluations, iterations, pause, .. } = *start;
-        Self { level, evaluations, first_evaluation: evaluations, iterations, pause, ..self }
+        let Start { level, evaluations, iterations, .. } = *start;
+        Self { level, evaluations, first_evaluation: evaluations, iterations, ..self }
     }
 
     pub(super) fn shape(&self) -> &Shape {
@@ -180,16 +179,11 @@ impl<'a> Run<'a> {
             return Some(StopReason::Interrupted);
         }
         let over = |limit: f64| self.clock.elapsed().as_secs_f64() >= limit;
-        // Without a first evaluation there would be nothing to keep, and what was computed before is replayed to its end. One that is
-        // resumed gets one evaluation further at least, however short its time.
-        let must_go_on = !self.has_computed || self.is_taking_up;
+        // Without a first evaluation there would be nothing to keep; a run that is resumed gets one evaluation further at least,
+        // however short its time.
+        let must_go_on = self.computed == 0 || self.is_taking_up;
         let is_over = !must_go_on && self.settings.max_time.is_some_and(over) && !self.is_replaying();
         is_over.then_some(StopReason::MaxTime)
-    }
-
-    /// Whether the search pauses before its next evaluation.
-    pub(super) fn is_paused(&self) -> bool {
-        self.pause.is_some_and(|pause| self.evaluations >= pause)
     }
 
     fn evaluations_left(&self) -> usize {
@@ -206,13 +200,13 @@ impl<'a> Run<'a> {
         let left = self.evaluations_left();
         let reason = match self.limit_reached() {
             Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
+            _ if self.supervisor.had_ended(self.evaluations) => Some(StopReason::Superseded),
             _ if left == 0 => Some(StopReason::MaxEvaluations),
-            None if self.is_paused() => Some(StopReason::Paused),
             // The last one is for a step back within the bounds.
             None if left == 1 && self.next_step_back()?.is_some() => Some(StopReason::MaxEvaluations),
             reason => reason,
         };
-        reason.map_or(Ok(()), |reason| Err(Stop::Limit(reason)))
+        reason.map_or_else(|| self.supervise(), |reason| Err(Stop::Limit(reason)))
     }
 
     /// Whether there are evaluations of before that are still to be replayed.
@@ -294,7 +288,8 @@ impl<'a> Run<'a> {
             let (evaluation, cause) = (record.row.evaluation, "the run now ends before it".to_owned());
             return Err(Error::Replay { evaluation, cause });
         }
-        let warnings = if stop_reason == StopReason::Paused { Vec::new() } else { self.reservations() };
+        let goes_on = stop_reason == StopReason::Superseded;
+        let warnings = if goes_on { Vec::new() } else { self.reservations() };
         warnings.iter().for_each(|warning| self.warn(warning));
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
@@ -304,6 +299,7 @@ impl<'a> Run<'a> {
         Ok(Optimised {
             stop_reason: if is_infeasible { StopReason::Infeasible } else { stop_reason },
             evaluations: self.evaluations,
+            computed: self.computed,
             iterations: self.iterations,
             initial: initial.objective,
             initial_members: initial.members,

@@ -17,9 +17,6 @@ pub struct Start {
     /// The design to go on from [m]; `None` for the initial one. The initial one is evaluated before it: it fixes the scale of
     /// the objective and the bounds of the constraints on this mesh.
     pub design: Option<Vec<f64>>,
-    /// After so many evaluations, those before included, the search ends with [`StopReason::Paused`] where it would ask for another
-    /// one. One with the same start but for this, whose recorder replays what there is, goes on as if there had been no pause.
-    pub pause: Option<usize>,
 }
 
 impl Run<'_> {

@@ -17,9 +17,9 @@ pub enum StopReason {
     MaxTime,
     /// A signal arrived.
     Interrupted,
-    /// A pause was asked for ([`Start::pause`](super::Start)): the run has not ended.
+    /// A [`Supervisor`](super::Supervisor) has ended this search for another one: the run has not ended.
     #[serde(skip)]
-    Paused,
+    Superseded,
     /// The mesh or the trust region held the search back.
     #[serde(rename = "mesh_limited", alias = "mesh_limit")]
     MeshLimited,
@@ -49,7 +49,7 @@ impl StopReason {
             Self::MaxEvaluations => "all evaluations are used",
             Self::MaxTime => "the time is over",
             Self::Interrupted => "interrupted",
-            Self::Paused => "paused",
+            Self::Superseded => "another search follows",
             Self::MeshLimited => "the mesh held the search back: not converged",
             Self::RoundoffLimited => "rounding allows the method no further step: not converged",
             Self::MethodStalled => "the method can make no further step",

@@ -153,14 +153,13 @@ fn an_objective_too_small_to_be_divided_by_is_an_error_before_anything_is_record
 
 #[test]
 fn a_mesh_that_inverts_under_a_bound_ends_at_the_mesh_limit_with_numbers_alone() {
-    // The hyperelastic law carries more, and comes to no limit.
-    for (law, max_evaluations) in [("linear", 30), ("rails", 30), ("hyperelastic", 12)] {
+    for law in ["linear", "rails"] {
         let law = format!("remesh.law=\"{law}\"");
         let (mut problem, settings) = quick(&[&law]);
         let shape = problem.shape_mut().unwrap();
         let n = shape.surface().variable_count();
         shape.set_bounds([vec![-9.9e-3; n], vec![60e-3; n]]);
-        let settings = Optimizer { max_evaluations, ..settings };
+        let settings = Optimizer { max_evaluations: 30, ..settings };
         let mut rows = Rows::default();
         let optimised = run(problem, &settings, &mut rows).0.unwrap();
         println!("{:?} after {} evaluations", optimised.stop_reason, optimised.evaluations);

@@ -1,0 +1,242 @@
+//! The searches of a run: one, or with a tolerance one on each mesh (`levels`), from the best design of the one before.
+
+use std::path::PathBuf;
+
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason, Supervisor, Unsupervised};
+use fluxmorph_optimizer::problem::{Derivatives, ErrorEstimate, NoProgress, SolverCache};
+use fluxmorph_remesh::Moved;
+
+use super::Session;
+use super::levels::{Levels, Looked, Refined, TimeLimit};
+use super::recorder::DirectoryRecorder;
+use crate::config::ElementOrder;
+use crate::error::Error;
+use crate::files::Refinements;
+use crate::show::RunObserver;
+
+/// What all searches of a run have come to.
+pub(super) struct Searched {
+    /// The last search, with the timings of all.
+    pub(super) optimised: Optimised,
+    /// The initial shape on the mesh of the last search.
+    pub(super) first: Moved,
+    /// The estimated error of the best design, where it is known already.
+    pub(super) at_best: Option<ErrorEstimate>,
+    /// How the mesh was refined; `None` without a tolerance.
+    pub(super) refinements: Option<Refinements>,
+}
+
+impl<'a> Session<'a> {
+    /// Whether its mesh is not that of the configuration any more.
+    pub(super) fn is_refined(refinements: Option<&Refinements>) -> bool {
+        refinements.is_some_and(|refinements| !refinements.refinements.is_empty())
+    }
+
+    /// Searches on one mesh after the other.
+    ///
+    /// # Errors
+    /// As [`driver::optimise`], and what the analysis of a design fails with.
+    pub(super) fn search(
+        &mut self,
+        recorder: &mut DirectoryRecorder,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Searched, Error> {
+        let settings = self.config.optimizer.settings();
+        let mut limit = TimeLimit::starting_now(settings.max_time);
+        let mut levels = self.levels(limit, observer)?;
+        if let Some(levels) = &mut levels {
+            self.refine_before_search(levels, recorder.is_replaying(), observer)?;
+            limit = levels.limit;
+        }
+        let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
+        let mut before: Option<Optimised> = None;
+        loop {
+            if recorder.is_replaying() {
+                limit.restart();
+            }
+            let first = self.setup.problem.moved(self.initial_design())?;
+            let settings = Settings { max_time: limit.left(), ..settings.clone() };
+            let mut unsupervised = Unsupervised;
+            let supervisor: &mut dyn Supervisor = match &mut levels {
+                Some(levels) => {
+                    levels.limit = limit;
+                    levels.begin(start.evaluations);
+                    levels
+                }
+                None => &mut unsupervised,
+            };
+            let problem = &mut self.setup.problem;
+            let watched = (recorder as _, supervisor);
+            let found =
+                driver::optimise_from(&start, problem, &settings, observer, watched, self.interrupted)?;
+            if found.computed == 0 {
+                // All of it was replayed.
+                limit.restart();
+            }
+            let mut optimised = sum(before.take(), found);
+            let (refined, at_best) = match &mut levels {
+                Some(levels) => {
+                    levels.limit = limit;
+                    self.refine_after_search(levels, &optimised, observer)?
+                }
+                None => (Refined::No, None),
+            };
+            match refined {
+                Refined::Yes(setup) => self.setup = *setup,
+                Refined::No | Refined::OutOf(..) => {
+                    if let Refined::OutOf(reason, warning) = refined {
+                        warning.iter().for_each(|warning| observer.warning(warning));
+                        optimised.warnings.extend(warning);
+                        optimised.stop_reason = reason;
+                    }
+                    let refinements = levels.map(Levels::into_refinements);
+                    return Ok(Searched { optimised, first, at_best, refinements });
+                }
+            }
+            start = Start {
+                level: start.level + 1,
+                evaluations: optimised.evaluations,
+                iterations: optimised.iterations,
+                design: Some(optimised.best.values.clone()),
+            };
+            before = Some(optimised);
+        }
+    }
+
+    /// The levels of a run with a tolerance, where its mesh can be refined.
+    fn levels(&self, limit: TimeLimit, observer: &mut dyn RunObserver) -> Result<Option<Levels<'a>>, Error> {
+        let levels = Levels::of(self, limit)?;
+        // Of second order the set-up has said it.
+        let levels = levels.filter(|_| self.config.analysis.order == ElementOrder::Linear);
+        if self.setup.problem.share().is_none() {
+            return Ok(levels);
+        }
+        if levels.is_some_and(|levels| levels.has_kept()) {
+            let path: PathBuf = self.directory.path().to_owned();
+            let cause = "its mesh was refined, which takes one process: resume it without ranks".to_owned();
+            return Err(Error::NotResumable { path, cause });
+        }
+        if self.config.accuracy.tolerance.is_some() {
+            observer.warning("accuracy.tolerance needs one process: the mesh of this run is not refined");
+        }
+        Ok(None)
+    }
+
+    /// Ends a run before its next evaluation once a signal came.
+    fn check_interrupted(&self) -> Result<(), OptimizerError> {
+        OptimizerError::check_interrupted(self.interrupted).map_err(|_| OptimizerError::InterruptedRun)
+    }
+
+    /// Refines the mesh until the error bar of the initial design is within the tolerance, or the time is over.
+    fn refine_before_search(
+        &mut self,
+        levels: &mut Levels<'a>,
+        has_begun: bool,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), Error> {
+        loop {
+            self.check_interrupted()?;
+            if let Some(setup) = levels.refine_again(0)? {
+                self.setup = *setup;
+                levels.limit.restart();
+                continue;
+            }
+            if has_begun {
+                return Ok(());
+            }
+            if levels.limit.is_over() {
+                observer.warning(
+                    "optimizer.max_time is over before the mesh is fine enough for accuracy.tolerance: the initial design is \
+                     evaluated on the mesh as it is, from which a resumed run goes on",
+                );
+                return Ok(());
+            }
+            observer.phase("solving the field of the initial design");
+            let problem = &self.setup.problem;
+            let (moved, cache) = (problem.moved(self.initial_design())?, &mut SolverCache::default());
+            let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
+            self.check_interrupted()?;
+            let Some(estimate) = levels.estimate(problem, &analysis, observer) else {
+                observer.warning("without an estimated error the mesh is not refined to accuracy.tolerance");
+                return Ok(());
+            };
+            let refined = levels.refine(
+                &Looked {
+                    problem,
+                    analysis: &analysis,
+                    estimate: &estimate,
+                    scale: analysis.objective.map_or(f64::NAN, f64::abs),
+                    evaluations: 0,
+                    is_out_of_time: levels.limit.is_over(),
+                },
+                observer,
+            );
+            match refined? {
+                Refined::Yes(setup) => self.setup = *setup,
+                Refined::No => return Ok(()),
+                Refined::OutOf(_, warning) => {
+                    warning.iter().for_each(|warning| observer.warning(warning));
+                    return Ok(());
+                }
+            }
+        }
+    }
+
+    /// Refines the mesh for the best design, where its error bar is beyond the tolerance and there is time to go on: whether it
+    /// was, and the estimate where it was made.
+    fn refine_after_search(
+        &self,
+        levels: &mut Levels<'a>,
+        optimised: &Optimised,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(Refined, Option<ErrorEstimate>), Error> {
+        let reason = optimised.stop_reason;
+        if let Some(setup) = levels.finer.take() {
+            return Ok((Refined::Yes(setup), None));
+        }
+        if reason != StopReason::Interrupted
+            && let Some(setup) = levels.refine_again(optimised.evaluations)?
+        {
+            return Ok((Refined::Yes(setup), None));
+        }
+        let is_over = matches!(
+            reason,
+            StopReason::MaxEvaluations
+                | StopReason::MaxTime
+                | StopReason::Interrupted
+                | StopReason::NumericalFailure
+        );
+        if is_over {
+            return Ok((Refined::No, None));
+        }
+        if (self.interrupted)() {
+            return Ok((Refined::OutOf(StopReason::Interrupted, None), None));
+        }
+        let (problem, analysis) = (&self.setup.problem, &optimised.best.analysis);
+        let Some(estimate) = levels.estimate(problem, analysis, observer) else {
+            return Ok((Refined::No, None));
+        };
+        let refined = levels.refine(
+            &Looked {
+                problem,
+                analysis,
+                estimate: &estimate,
+                scale: optimised.initial.abs().max(optimised.best.objective.abs()),
+                evaluations: optimised.evaluations,
+                is_out_of_time: optimised.computed > 0 && levels.limit.is_over(),
+            },
+            observer,
+        )?;
+        let estimate = Some(estimate).filter(|_| !matches!(refined, Refined::Yes(_)));
+        Ok((refined, estimate))
+    }
+}
+
+/// The last search, with what those before it took.
+fn sum(before: Option<Optimised>, last: Optimised) -> Optimised {
+    let Some(before) = before else { return last };
+    let mut timings = before.timings;
+    timings += last.timings;
+    Optimised { timings, worst_residual: before.worst_residual.max(last.worst_residual), ..last }
+}
