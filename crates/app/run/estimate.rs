@@ -83,8 +83,7 @@ impl<'a> Estimator<'a> {
         analysis: &Analysis,
         observer: &mut dyn Observer,
     ) -> Option<ErrorEstimate> {
-        let problem = self.problem;
-        if let Some(shortage) = memory_limit::shortage(memory(self.config, problem)?) {
+        if let Some(shortage) = memory_limit::shortage(memory(self.config, self.problem)?) {
             observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
             return None;
         }
@@ -92,7 +91,7 @@ impl<'a> Estimator<'a> {
         let estimated = if self.config.analysis.order == ElementOrder::Quadratic {
             self.on_halved_edges(analysis)
         } else {
-            problem.estimate_error(analysis, &mut self.models).map_err(Error::from)
+            self.problem.estimate_error(analysis, &mut self.models).map_err(Error::from)
         };
         match estimated {
             Ok(estimate) => Some(estimate),

@@ -32,8 +32,8 @@ pub(super) enum Refined {
     Yes(Box<Setup>),
     /// The mesh stays as it is: it is fine enough, or cannot be refined, for a reason that was reported.
     No,
-    /// There is nothing left to use a finer mesh with: what ends the run, and a warning of the tolerance; a signal is none.
-    OutOf(StopReason, Option<String>),
+    /// There is nothing left to use a finer mesh with: what ends the run.
+    OutOf(StopReason),
 }
 
 /// A design with its field, whose error bar is compared with the tolerance.
@@ -56,41 +56,12 @@ const TAKEN_UP: usize = 2;
 /// take ten to fifteen to converge.
 const FIRST_LOOK: usize = 10;
 
-/// The time of a run: that of what it computes, refinements included, and not of what it repeats from its journal.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct TimeLimit {
-    most: Option<f64>,
-    since: Instant,
-}
-
-impl TimeLimit {
-    /// So many seconds from now.
-    pub(super) fn starting_now(most: Option<f64>) -> Self {
-        Self { most, since: Instant::now() }
-    }
-
-    /// All of it from now.
-    pub(super) fn restart(&mut self) {
-        self.since = Instant::now();
-    }
-
-    /// What is left [s]; `None` without a limit.
-    pub(super) fn left(&self) -> Option<f64> {
-        self.most.map(|most| (most - self.since.elapsed().as_secs_f64()).max(0.0))
-    }
-
-    pub(super) fn is_over(&self) -> bool {
-        self.left().is_some_and(|left| left <= 0.0)
-    }
-}
-
 /// The mesh of a run with a tolerance.
 pub(super) struct Levels<'a> {
     config: &'a Config,
     source: &'a SourceMap,
     directory: RunDirectory,
     interrupted: &'a dyn Fn() -> bool,
-    pub(super) limit: TimeLimit,
     mesh: RefinedMesh,
     /// The refinements so far; behind them, while a run is resumed, those that are still to be made again.
     kept: Refinements,
@@ -101,13 +72,15 @@ pub(super) struct Levels<'a> {
     begun: usize,
     /// After how many evaluations the search was looked at last, and the evaluation of its best design then.
     looked: Option<[usize; 2]>,
+    /// Why the run ends on this mesh though it is too coarse; reported already.
+    pub(super) warnings: Vec<String>,
     /// The problem on the mesh that was refined during a search, until that has ended.
     pub(super) finer: Option<Box<Setup>>,
 }
 
 impl<'a> Levels<'a> {
     /// Those of a run that is begun or resumed; `None` without a tolerance.
-    pub(super) fn of(session: &Session<'a>, limit: TimeLimit) -> Result<Option<Self>, Error> {
+    pub(super) fn of(session: &Session<'a>) -> Result<Option<Self>, Error> {
         let Session { config, source, interrupted, .. } = *session;
         let Some(tolerance) = config.accuracy.tolerance else { return Ok(None) };
         let directory = session.directory.clone();
@@ -118,13 +91,13 @@ impl<'a> Levels<'a> {
             source,
             directory,
             interrupted,
-            limit,
             kept,
             made: 0,
             tolerance,
             most: config.accuracy.max_refinements,
             begun: 0,
             looked: None,
+            warnings: Vec::new(),
             finer: None,
         }))
     }
@@ -142,6 +115,7 @@ impl<'a> Levels<'a> {
     /// Begins a search after so many evaluations.
     pub(super) fn begin(&mut self, evaluations: usize) {
         (self.begun, self.looked) = (evaluations, None);
+        self.warnings.clear();
     }
 
     /// The refinement that the run before its interruption made after so many evaluations.
@@ -201,10 +175,12 @@ impl<'a> Levels<'a> {
             let left =
                 if reason == StopReason::MaxTime { "there is no time" } else { "too few evaluations are" };
             let warning = format!("{said}, and {left} left for a finer mesh: the tolerance is not kept");
-            return Ok(Refined::OutOf(reason, Some(warning)));
+            observer.warning(&warning);
+            self.warnings.push(warning);
+            return Ok(Refined::OutOf(reason));
         }
         if (self.interrupted)() {
-            return Ok(Refined::OutOf(StopReason::Interrupted, None));
+            return Ok(Refined::OutOf(StopReason::Interrupted));
         }
         observer.phase("refining the mesh");
         let full = self.mesh.mesh().topology();
@@ -311,7 +287,7 @@ impl Supervisor for Levels<'_> {
         standing: &Standing<'_>,
         observer: &mut dyn Observer,
     ) -> Result<Option<StopReason>, OptimizerError> {
-        let &Standing { problem, evaluations, initial, best_evaluation, best, computed } = standing;
+        let &Standing { problem, evaluations, initial, best_evaluation, best, deadline } = standing;
         let before = self.looked.replace([evaluations, best_evaluation]);
         if before.is_some_and(|[_, best]| best == best_evaluation) {
             return Ok(None);
@@ -324,7 +300,7 @@ impl Supervisor for Levels<'_> {
                 estimate: &estimate,
                 scale: initial.abs().max(best.objective.map_or(0.0, f64::abs)),
                 evaluations,
-                is_out_of_time: computed > 0 && self.limit.is_over(),
+                is_out_of_time: deadline.is_some_and(|deadline| Instant::now() >= deadline),
             },
             observer,
         );
@@ -334,10 +310,7 @@ impl Supervisor for Levels<'_> {
                 Some(StopReason::Superseded)
             }
             Refined::No => None,
-            Refined::OutOf(reason, warning) => {
-                warning.iter().for_each(|warning| observer.warning(warning));
-                Some(reason)
-            }
+            Refined::OutOf(reason) => Some(reason),
         })
     }
 }

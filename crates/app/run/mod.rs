@@ -5,7 +5,6 @@
 //! (`recorder`); `result.json` when all is done. A run that fails leaves a manifest that says so, every file under its
 //! final name is whole, and it can be resumed.
 
-mod changed_key;
 pub mod confirmation;
 pub(crate) mod estimate;
 mod facets;

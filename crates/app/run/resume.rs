@@ -6,7 +6,6 @@ use std::sync::Arc;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
 
-use super::changed_key::changed_key;
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
 use super::{Concluded, Options, Session};
@@ -17,7 +16,7 @@ use crate::files::{
     Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
     surface_files,
 };
-use crate::run::journal::{Contents, Identity, Journal, Rest};
+use crate::run::journal::{Contents, Identity, Journal, Rest, changed_key};
 use crate::show::RunObserver;
 
 /// Largest configuration that is read [bytes].

@@ -1,6 +1,7 @@
 //! The searches of a run: one, or with a tolerance one on each mesh (`levels`), from the best design of the one before.
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason, Supervisor, Unsupervised};
@@ -8,7 +9,7 @@ use fluxmorph_optimizer::problem::{Derivatives, ErrorEstimate, NoProgress, Solve
 use fluxmorph_remesh::Moved;
 
 use super::Session;
-use super::levels::{Levels, Looked, Refined, TimeLimit};
+use super::levels::{Levels, Looked, Refined};
 use super::recorder::DirectoryRecorder;
 use crate::config::ElementOrder;
 use crate::error::Error;
@@ -25,6 +26,33 @@ pub(super) struct Searched {
     pub(super) at_best: Option<ErrorEstimate>,
     /// How the mesh was refined; `None` without a tolerance.
     pub(super) refinements: Option<Refinements>,
+}
+
+/// The time of a run: that of what it computes, refinements included, and not of what it repeats from its journal.
+struct TimeLimit {
+    most: Option<f64>,
+    since: Instant,
+}
+
+impl TimeLimit {
+    /// So many seconds from now.
+    fn starting_now(most: Option<f64>) -> Self {
+        Self { most, since: Instant::now() }
+    }
+
+    /// All of it from now.
+    fn restart(&mut self) {
+        self.since = Instant::now();
+    }
+
+    /// What is left [s]; `None` without a limit.
+    fn left(&self) -> Option<f64> {
+        self.most.map(|most| (most - self.since.elapsed().as_secs_f64()).max(0.0))
+    }
+
+    fn is_over(&self) -> bool {
+        self.left().is_some_and(|left| left <= 0.0)
+    }
 }
 
 impl<'a> Session<'a> {
@@ -44,10 +72,9 @@ impl<'a> Session<'a> {
     ) -> Result<Searched, Error> {
         let settings = self.config.optimizer.settings();
         let mut limit = TimeLimit::starting_now(settings.max_time);
-        let mut levels = self.levels(limit, observer)?;
+        let mut levels = self.levels(observer)?;
         if let Some(levels) = &mut levels {
-            self.refine_before_search(levels, recorder.is_replaying(), observer)?;
-            limit = levels.limit;
+            self.refine_before_search(levels, recorder.is_replaying(), &mut limit, observer)?;
         }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
         let mut before: Option<Optimised> = None;
@@ -60,7 +87,6 @@ impl<'a> Session<'a> {
             let mut unsupervised = Unsupervised;
             let supervisor: &mut dyn Supervisor = match &mut levels {
                 Some(levels) => {
-                    levels.limit = limit;
                     levels.begin(start.evaluations);
                     levels
                 }
@@ -76,19 +102,17 @@ impl<'a> Session<'a> {
             }
             let mut optimised = sum(before.take(), found);
             let (refined, at_best) = match &mut levels {
-                Some(levels) => {
-                    levels.limit = limit;
-                    self.refine_after_search(levels, &optimised, observer)?
-                }
+                Some(levels) => self.refine_after_search(levels, &optimised, &limit, observer)?,
                 None => (Refined::No, None),
             };
             match refined {
                 Refined::Yes(setup) => self.setup = *setup,
                 Refined::No | Refined::OutOf(..) => {
-                    if let Refined::OutOf(reason, warning) = refined {
-                        warning.iter().for_each(|warning| observer.warning(warning));
-                        optimised.warnings.extend(warning);
+                    if let Refined::OutOf(reason) = refined {
                         optimised.stop_reason = reason;
+                    }
+                    if let Some(levels) = &mut levels {
+                        optimised.warnings.append(&mut levels.warnings);
                     }
                     let refinements = levels.map(Levels::into_refinements);
                     return Ok(Searched { optimised, first, at_best, refinements });
@@ -105,8 +129,8 @@ impl<'a> Session<'a> {
     }
 
     /// The levels of a run with a tolerance, where its mesh can be refined.
-    fn levels(&self, limit: TimeLimit, observer: &mut dyn RunObserver) -> Result<Option<Levels<'a>>, Error> {
-        let levels = Levels::of(self, limit)?;
+    fn levels(&self, observer: &mut dyn RunObserver) -> Result<Option<Levels<'a>>, Error> {
+        let levels = Levels::of(self)?;
         // Of second order the set-up has said it.
         let levels = levels.filter(|_| self.config.analysis.order == ElementOrder::Linear);
         if self.setup.problem.share().is_none() {
@@ -133,19 +157,20 @@ impl<'a> Session<'a> {
         &mut self,
         levels: &mut Levels<'a>,
         has_begun: bool,
+        limit: &mut TimeLimit,
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
         loop {
             self.check_interrupted()?;
             if let Some(setup) = levels.refine_again(0)? {
                 self.setup = *setup;
-                levels.limit.restart();
+                limit.restart();
                 continue;
             }
             if has_begun {
                 return Ok(());
             }
-            if levels.limit.is_over() {
+            if limit.is_over() {
                 observer.warning(
                     "optimizer.max_time is over before the mesh is fine enough for accuracy.tolerance: the initial design is \
                      evaluated on the mesh as it is, from which a resumed run goes on",
@@ -168,17 +193,13 @@ impl<'a> Session<'a> {
                     estimate: &estimate,
                     scale: analysis.objective.map_or(f64::NAN, f64::abs),
                     evaluations: 0,
-                    is_out_of_time: levels.limit.is_over(),
+                    is_out_of_time: limit.is_over(),
                 },
                 observer,
             );
             match refined? {
                 Refined::Yes(setup) => self.setup = *setup,
-                Refined::No => return Ok(()),
-                Refined::OutOf(_, warning) => {
-                    warning.iter().for_each(|warning| observer.warning(warning));
-                    return Ok(());
-                }
+                Refined::No | Refined::OutOf(_) => return Ok(()),
             }
         }
     }
@@ -189,6 +210,7 @@ impl<'a> Session<'a> {
         &self,
         levels: &mut Levels<'a>,
         optimised: &Optimised,
+        limit: &TimeLimit,
         observer: &mut dyn RunObserver,
     ) -> Result<(Refined, Option<ErrorEstimate>), Error> {
         let reason = optimised.stop_reason;
@@ -211,7 +233,7 @@ impl<'a> Session<'a> {
             return Ok((Refined::No, None));
         }
         if (self.interrupted)() {
-            return Ok((Refined::OutOf(StopReason::Interrupted, None), None));
+            return Ok((Refined::OutOf(StopReason::Interrupted), None));
         }
         let (problem, analysis) = (&self.setup.problem, &optimised.best.analysis);
         let Some(estimate) = levels.estimate(problem, analysis, observer) else {
@@ -224,7 +246,7 @@ impl<'a> Session<'a> {
                 estimate: &estimate,
                 scale: optimised.initial.abs().max(optimised.best.objective.abs()),
                 evaluations: optimised.evaluations,
-                is_out_of_time: optimised.computed > 0 && levels.limit.is_over(),
+                is_out_of_time: optimised.computed > 0 && limit.is_over(),
             },
             observer,
         )?;

@@ -45,8 +45,7 @@ impl Session<'_> {
         let mesh = &analysis.mesh;
         let clock = Instant::now();
         let terminals = all_terminals(problem, analysis)?;
-        let mut timings_s = self.timings_result(timings);
-        timings_s.insert("terminals".to_owned(), clock.elapsed().as_secs_f64());
+        let terminals_seconds = clock.elapsed().as_secs_f64();
         let mut states = self.state_results(analysis, observer);
         for (index, (state, terminals)) in states.iter_mut().zip(&terminals).enumerate() {
             self.complete(index, analysis, terminals, state)?;
@@ -90,7 +89,7 @@ impl Session<'_> {
             inductance_h,
             multipoles,
             linear_solver: linear_solver(problem, analysis, analysis.worst_residual),
-            timings_s,
+            timings_s: self.timings_result(timings, terminals_seconds),
             warnings,
             peak_memory_bytes: peak_memory_bytes(),
         })
@@ -140,7 +139,7 @@ impl Session<'_> {
     }
 
     /// Seconds of every stage.
-    fn timings_result(&self, timings: &Timings) -> BTreeMap<String, f64> {
+    fn timings_result(&self, timings: &Timings, terminals: f64) -> BTreeMap<String, f64> {
         BTreeMap::from(
             [
                 ("total", self.clock.elapsed().as_secs_f64()),
@@ -151,6 +150,7 @@ impl Session<'_> {
                 ("state", timings.state),
                 ("adjoint", timings.adjoint),
                 ("gradient", timings.gradient),
+                ("terminals", terminals),
             ]
             .map(|(stage, seconds)| (stage.to_owned(), seconds)),
         )

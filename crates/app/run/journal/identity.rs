@@ -81,7 +81,7 @@ impl Identity {
 /// BLAKE3 of everything in a configuration that an evaluation or the method depends on, hexadecimal.
 ///
 /// Title, probes, output and the limits of evaluations and time are not in it: with other ones a run may be resumed. Nor are
-/// the paths of a mesh file and of B–H tables: their content is in [`mesh_hash`] and `tables_hash`.
+/// the paths of a mesh file and of B–H tables (`changed_key` names the same): their content is in [`mesh_hash`] and `tables_hash`.
 pub fn configuration_hash(config: &Config) -> String {
     let mut bare = config.clone();
     let Optimizer { max_evaluations, max_time, .. } = Optimizer::default();

@@ -9,6 +9,7 @@
 //! that was cut short, changed or moved ends what is read. A journal belongs to an [`Identity`]: program version,
 //! configuration and mesh.
 
+mod changed_key;
 mod identity;
 mod line;
 
@@ -17,6 +18,7 @@ use fluxmorph_optimizer::driver::Record;
 use crate::error::Error;
 use crate::files::{OutputError, RunDirectory, SyncedLog};
 
+pub(super) use changed_key::changed_key;
 pub use identity::{Identity, configuration_hash, mesh_hash};
 
 /// Largest journal that is read [bytes]: four hundred thousand evaluations of a thousand variables.

@@ -1,5 +1,7 @@
 //! Who looks at a search on its way, and may end it.
 
+use std::time::{Duration, Instant};
+
 use super::incumbent::BestField;
 use super::observer::Observer;
 use super::run::Run;
@@ -21,8 +23,8 @@ pub struct Standing<'a> {
     pub best_evaluation: usize,
     /// The field of the best design.
     pub best: &'a Analysis,
-    /// Evaluations of this search that were not replayed.
-    pub computed: usize,
+    /// When the time of the run is over; `None` without a limit, and before anything was computed that was not replayed.
+    pub deadline: Option<Instant>,
 }
 
 /// Looks at a search between two evaluations, and may end it. Nothing is asked while evaluations are replayed, so that answers must
@@ -61,11 +63,17 @@ pub struct Unsupervised;
 impl Supervisor for Unsupervised {}
 
 impl Run<'_> {
+    fn deadline(&self) -> Option<Instant> {
+        let seconds = self.settings.max_time.filter(|_| self.computed > 0)?;
+        self.clock.checked_add(Duration::try_from_secs_f64(seconds).ok()?)
+    }
+
     /// Lets the supervisor look at the search, where it wants to.
     pub(super) fn supervise(&mut self) -> Result<(), Stop> {
         if !self.supervisor.is_due(self.evaluations) {
             return Ok(());
         }
+        let deadline = self.deadline();
         let (Some(best), Some(initial)) = (&mut self.best, &self.initial) else { return Ok(()) };
         best.compute_field(self.problem, self.observer)?;
         let BestField::Computed(analysis) = &best.field else { return Ok(()) };
@@ -75,7 +83,7 @@ impl Run<'_> {
             initial: initial.objective,
             best_evaluation: best.evaluation,
             best: analysis,
-            computed: self.computed,
+            deadline,
         };
         let reason = self.supervisor.look(&standing, self.observer)?;
         // That may have taken long.

@@ -8,13 +8,13 @@ use crate::files::RunDirectory;
 /// Largest file that is compared [bytes].
 const LARGEST: u64 = 1 << 24;
 
-/// What a resumed run may have others of.
+/// What [`configuration_hash`](super::configuration_hash) leaves out, beside the paths of B–H tables.
 const OF_NO_ACCOUNT: [&str; 6] =
     ["title", "probes", "output", "optimizer.max_evaluations", "optimizer.max_time", "mesh.file"];
 
 /// The first key that differs from `resolved.toml` of the run, which it has from its beginning; `None` where there is none, or no such
 /// file to read.
-pub(super) fn changed_key(directory: &RunDirectory, config: &Config) -> Option<String> {
+pub(in crate::run) fn changed_key(directory: &RunDirectory, config: &Config) -> Option<String> {
     let bytes = directory.disk().read(&directory.resolved(), LARGEST).ok()?;
     let was: Table = std::str::from_utf8(&bytes).ok()?.parse().ok()?;
     let is: Table = resolved_toml(config).parse().ok()?;
