@@ -42,6 +42,7 @@ pub(crate) use field::{remaining_elements, remaining_nodes};
 pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};
 pub use names::with_names;
+pub(crate) use open::is_open;
 pub use outline::{Outline, OutlinedDesign, outline};
 pub(crate) use references::functionals;
 pub(crate) use refined::RefinedMesh;

@@ -15,6 +15,11 @@ const REGION: &str = "open";
 /// Its outer surface.
 const INFINITY: &str = "infinity";
 
+/// Whether a region is the shell of open space.
+pub(crate) fn is_open(config: &Config, region: &str) -> bool {
+    config.open.as_ref().is_some_and(|open| region_of(open) == region)
+}
+
 /// The name of the shell's region.
 pub(super) fn region_of(open: &Open) -> &str {
     open.region.as_deref().unwrap_or(REGION)

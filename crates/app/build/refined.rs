@@ -41,6 +41,11 @@ impl RefinedMesh {
         &self.mesh
     }
 
+    /// Of every node that the first mesh does not have, the two in whose middle it lies; both have lower numbers.
+    pub(crate) fn parents(&self) -> &[[NodeId; 2]] {
+        &self.parents
+    }
+
     /// Halves the edges of marked elements.
     ///
     /// # Errors

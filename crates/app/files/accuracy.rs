@@ -77,6 +77,10 @@ pub struct CurvedFacets {
     pub off_m: f64,
     /// Where that is [m].
     pub at_m: [f64; 3],
+    /// What the objective at the initial and at the best design has more, about, where the facets of all curved surfaces lie on
+    /// these in the mean [its unit]; of an analysis both are the same. `None` where that is not known.
+    #[serde(default)]
+    pub change: Option<[f64; 2]>,
 }
 
 /// The gain of a run by other elements on its own mesh.

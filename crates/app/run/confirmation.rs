@@ -13,14 +13,13 @@ use fluxmorph_remesh::Moved;
 
 use super::Session;
 use super::estimate::{Estimator, left_out};
-use super::facets::{curved_facets, described, is_empty};
 use super::finer::{Cut, FinerProblem, looked_at_once};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
 use crate::files::{
-    Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, SAFETY, StopReason,
-    Verdict, relative_bar,
+    Accuracy, CrossCheck, ObjectiveResult, OverwritePolicy, Refinements, SAFETY, StopReason, Verdict,
+    relative_bar,
 };
 use crate::show::Observer;
 
@@ -107,9 +106,24 @@ impl Session<'_> {
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
         let shape = self.cut_shape(objective, meshes);
-        let is_said = errors.is_some() || objective.is_verified_on_cut_elements();
-        let facets = is_said.then(|| self.facets_of(shape, observer)).flatten();
+        let is_said = errors.is_some()
+            || objective.is_verified_on_cut_elements()
+            || self.is_geometry_looked_at() && self.is_checked(stop_reason);
+        let facets = is_said.then(|| {
+            let [initial, best] = meshes.solved.each_ref();
+            let is_one_design = initial.points() == best.points();
+            let shapes = [(initial, objective.initial), (best, objective.best)];
+            let is_measured = self.has_field_objective() && self.is_geometry_looked_at();
+            let shapes = match is_measured {
+                false => &[],
+                true if is_one_design => &shapes[..1],
+                true => &shapes[..],
+            };
+            self.facets_of(shape, shapes, observer)
+        });
+        let facets = facets.flatten();
         let near_wall = is_said.then(|| self.near_wall_noted(observer)).flatten();
+        let changes = facets.as_ref().and_then(|facets| facets.change);
         let mut accuracy = Accuracy { facets, near_wall, ..Accuracy::default() };
         if !self.has_field_objective() {
             return Some(accuracy).filter(Accuracy::says_something_of_the_geometry);
@@ -119,7 +133,7 @@ impl Session<'_> {
         }
         let tolerance = self.config.accuracy.tolerance.zip(errors);
         accuracy.within_tolerance =
-            tolerance.map(|(tolerance, errors)| is_within(tolerance, errors, objective, observer));
+            tolerance.map(|(tolerance, errors)| is_within(tolerance, (errors, changes), objective, observer));
         let at_limit = matches!(stop_reason, StopReason::MaxEvaluations | StopReason::MaxTime);
         let can_refine = |own: &Refinements| own.refinements.len() < self.config.accuracy.max_refinements;
         if accuracy.within_tolerance == Some(false) && at_limit && refinements.is_some_and(can_refine) {
@@ -163,7 +177,10 @@ impl Session<'_> {
     ) {
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.values);
         let verified = objective.verification.as_ref().map(|found| [found.initial, found.best]);
-        let others: Vec<[f64; 2]> = [verified, corrected, cross_check].into_iter().flatten().collect();
+        let on_surfaces = accuracy.facets.as_ref().and_then(|facets| facets.change);
+        let on_surfaces = on_surfaces.map(|[first, last]| [objective.initial + first, objective.best + last]);
+        let others: Vec<[f64; 2]> =
+            [verified, corrected, cross_check, on_surfaces].into_iter().flatten().collect();
         // A best design that is none for the objective alone, as where it has to keep a constraint first, has no gain, nor has one
         // that violates a constraint.
         let sign = self.config.objective.as_ref().map_or(1.0, |objective| objective.goal.sign());
@@ -213,6 +230,13 @@ impl Session<'_> {
         None
     }
 
+    /// Whether what no estimate of the field has is looked at, whatever the order: where an objective is, on one process.
+    pub(super) fn is_geometry_looked_at(&self) -> bool {
+        self.config.accuracy.estimate != Some(false)
+            && self.config.objective.is_some()
+            && self.setup.problem.share().is_none()
+    }
+
     /// Whether the objective has errors of the field; those of a volume or mass are its constraints'.
     pub(super) fn has_field_objective(&self) -> bool {
         self.config.objective.as_ref().is_some_and(Objective::is_of_field)
@@ -223,19 +247,6 @@ impl Session<'_> {
     fn cut_shape<'a>(&self, objective: &ObjectiveResult, meshes: &'a ShapeMeshes) -> Option<&'a Mesh> {
         let has_grid = self.config.design.as_ref().is_some_and(|design| design.grid.is_some());
         (has_grid && objective.is_verified_on_cut_elements()).then_some(&meshes.solved[1])
-    }
-
-    /// What no estimate and no refinement has of the geometry, initially and at a `shape`, which is reported.
-    pub(super) fn facets_of(
-        &self,
-        shape: Option<&Mesh>,
-        observer: &mut dyn Observer,
-    ) -> Option<CurvedFacets> {
-        let of_shape = shape.and_then(|mesh| curved_facets(mesh, |name| is_empty(self.config, name)));
-        let off = |facets: &Option<CurvedFacets>| facets.as_ref().map_or(0.0, |facets| facets.off_m);
-        let facets = if off(&of_shape) > off(&self.facets) { of_shape } else { self.facets.clone() }?;
-        observer.notice(&described(&facets));
-        Some(facets)
     }
 
     /// What no estimate has of a near wall, which is reported.
@@ -255,22 +266,28 @@ impl Session<'_> {
     }
 }
 
-/// Whether the error bars of both designs are within a tolerance; which are not is reported.
+/// Whether the error bars of both designs, with what facets change, are within a tolerance; which are not is reported.
 fn is_within(
     tolerance: f64,
-    errors: [f64; 2],
+    (errors, changes): ([f64; 2], Option<[f64; 2]>),
     objective: &ObjectiveResult,
     observer: &mut dyn Observer,
 ) -> bool {
     let larger = objective.initial.abs().max(objective.best.abs());
-    let scales = [("initial", objective.initial), ("best", larger)];
-    let beyond: Vec<String> = scales
-        .into_iter()
-        .zip(errors)
-        .map(|((design, scale), error)| (design, relative_bar(error, scale).unwrap_or(f64::INFINITY)))
-        .filter(|(_, bar)| *bar > tolerance)
-        .map(|(design, bar)| format!("{:.3} % for the {design} design", 100.0 * bar))
-        .collect();
+    let designs = [("initial", objective.initial), ("best", larger)];
+    let changes = changes.unwrap_or_default();
+    let mut beyond = Vec::new();
+    for (k, (design, scale)) in designs.into_iter().enumerate() {
+        let bar = relative_bar(errors[k], scale).unwrap_or(f64::INFINITY);
+        let facets = (changes[k] / scale).abs();
+        if bar + facets > tolerance {
+            let of_facets = match facets {
+                0.0 => String::new(),
+                _ => format!(" and {:.3} % of the facets", 100.0 * facets),
+            };
+            beyond.push(format!("{:.3} %{of_facets} for the {design} design", 100.0 * bar));
+        }
+    }
     if !beyond.is_empty() {
         observer.notice(&format!(
             "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}",

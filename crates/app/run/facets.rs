@@ -1,141 +1,216 @@
-//! How far the facets of a mesh are from the curved surfaces that they stand for: the error of the geometry, which no
-//! refinement of the mesh takes away, since new nodes lie on the facets, and which is in no estimate of the field.
+//! How far the facets of a mesh are from the curved surfaces that they stand for, and what that does to the objective: the
+//! error of the geometry, which no refinement of the mesh takes away, since new nodes lie on the facets, and which is in no
+//! estimate of the field.
 //!
-//! The surface is taken from the facets themselves: with the mean normals `n` of the smooth surface at the ends of an edge `e`, its
-//! middle lies `|(n_b − n_a)·e|/8` off, exactly so of a circle (`L²/(8R)`). Facets of one interface are one smooth surface
-//! where they meet at less than [`SMOOTH`]; flatter than [`FLAT`] they are a plane.
+//! What it does is found by trying: with the nodes of curved surfaces moved until the facets lie on these in the mean
+//! ([`CurvedSurfaces::onto_surfaces`]) bodies have the volume that they are meant to have, and the objective is computed once more.
 
-use std::collections::BTreeMap;
+use fluxmorph_geometry::curved::CurvedSurfaces;
+use fluxmorph_geometry::tet4::{Point, centroid, volume};
+use fluxmorph_geometry::{Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::problem::SolverCache;
 
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
-use fluxmorph_geometry::{Mesh, Millimetres, NodeId, millimetres};
-
-use crate::build::{functionals, is_air, is_wound};
+use super::Session;
+use super::finer::{Cut, FinerProblem, looked_at_once};
+use crate::build::{functionals, is_air, is_open, is_wound, memory_limit, remaining_nodes};
 use crate::config::Config;
-use crate::files::CurvedFacets;
+use crate::error::Error;
+use crate::files::{CurvedFacets, OverwritePolicy};
+use crate::show::Observer;
 
-/// Cosine of the largest angle, 35°, at which two facets are taken for one curved surface: a ball with eight of them along a half
-/// circle, and no chamfer of 45°.
-const SMOOTH: f64 = 0.82;
+/// Share of its volume that an element keeps at least when nodes move: where its facets are farther off than that, nodes go a part
+/// of the way, and the objective's change is taken to go on as it began.
+const KEPT_VOLUME: f64 = 0.5;
 
-/// Share of an edge's length below which its middle is taken to lie on the surface: planes of a mesh file with few digits.
-const FLAT: f64 = 1e-5;
+/// The least part of the way: less would be noise of the linear solver.
+const LEAST_PART: f64 = 1.0 / 64.0;
 
-/// A face between two regions, or at the outside of one.
-struct Face {
-    nodes: [NodeId; 3],
-    /// Of the regions on both sides; the second is missing at the outside.
-    between: (usize, Option<usize>),
-    area: Point,
+/// The facets of a mesh with all its regions, as it was read or generated.
+#[derive(Debug)]
+pub(super) struct FirstFacets {
+    mesh: Mesh,
+    /// Of every node that the mesh has more by now, the two in whose middle it lies.
+    parents: Vec<[NodeId; 2]>,
+    farthest: CurvedFacets,
 }
 
-/// Whether two faces belong to one smooth surface.
-fn is_smooth(a: &Face, b: &Face) -> bool {
-    a.between == b.between && dot(a.area, b.area) > SMOOTH * norm(a.area) * norm(b.area)
+impl FirstFacets {
+    /// Those of a mesh; `None` where no surface that counts is curved.
+    pub(super) fn of(config: &Config, mesh: &Mesh) -> Option<Self> {
+        let farthest = farthest(config, mesh)?;
+        Some(Self { mesh: mesh.clone(), parents: Vec::new(), farthest })
+    }
+
+    /// The same of a mesh whose nodes these parents have by now.
+    #[must_use]
+    pub(super) fn refined(self, parents: Vec<[NodeId; 2]>) -> Self {
+        Self { parents, ..self }
+    }
+
+    /// The motion of all nodes [m] that brings the facets onto their surfaces, where the nodes lie so [m]; new ones stay in the middle.
+    fn onto_surfaces(&self, config: &Config, points: &[Point]) -> Vec<Point> {
+        let topology = self.mesh.topology();
+        let first = &points[..topology.node_count()];
+        let mut motion = CurvedSurfaces::new(topology, first, counted(config, topology)).onto_surfaces();
+        for &[a, b] in &self.parents {
+            motion.push(centroid([motion[a.index()], motion[b.index()]]));
+        }
+        motion
+    }
 }
 
-/// The edge whose middle is farthest off the surface that its facets stand for; `None` where no surface is curved. Between two
-/// regions that are `empty` there is none: nothing changes there.
-pub(super) fn curved_facets(mesh: &Mesh, empty: impl Fn(&str) -> bool) -> Option<CurvedFacets> {
+/// The edge whose middle is farthest off the surface that its facets stand for; `None` where no surface is curved.
+fn farthest(config: &Config, mesh: &Mesh) -> Option<CurvedFacets> {
     let topology = mesh.topology();
-    let empty: Vec<bool> = topology.region_names().iter().map(|name| empty(name)).collect();
-    let region = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()].index();
-    let of = |facet: &fluxmorph_geometry::topology::Facet| {
-        let between = (region(facet.inside), facet.outside.map(region));
-        let area = area_vector(facet.nodes.map(|n| mesh.point(n)));
-        // One direction for both orders of the regions.
-        match between {
-            (own, Some(other)) if own == other || empty[own] && empty[other] => None,
-            (own, Some(other)) if own > other => {
-                Some(Face { nodes: facet.nodes, between: (other, Some(own)), area: area.map(|c| -c) })
-            }
-            _ => Some(Face { nodes: facet.nodes, between, area }),
-        }
-    };
-    let faces: Vec<Face> = topology.facets().iter().filter_map(of).collect();
-    let mut around: BTreeMap<NodeId, Vec<usize>> = BTreeMap::new();
-    for (i, face) in faces.iter().enumerate() {
-        face.nodes.iter().for_each(|&n| around.entry(n).or_default().push(i));
-    }
-    let normal = |node: NodeId, face: &Face| {
-        let own = around[&node].iter().map(|&i| &faces[i]).filter(|other| is_smooth(face, other));
-        let sum = own.fold([0.0; 3], |sum: Point, f| std::array::from_fn(|d| sum[d] + f.area[d]));
-        sum.map(|c| c / norm(sum))
-    };
-    // The outside counts where nothing inside is curved.
-    let mut worst: Option<((bool, f64), [NodeId; 2], &Face)> = None;
-    for face in &faces {
-        let normals = face.nodes.map(|n| normal(n, face));
-        for (a, b) in [(0, 1), (1, 2), (2, 0)] {
-            let along = sub(mesh.point(face.nodes[b]), mesh.point(face.nodes[a]));
-            let off = dot(sub(normals[b], normals[a]), along).abs() / 8.0;
-            let rank = (face.between.1.is_some(), off);
-            if off > FLAT * norm(along) && worst.is_none_or(|(most, ..)| rank > most) {
-                worst = Some((rank, [face.nodes[a], face.nodes[b]], face));
-            }
-        }
-    }
-    worst.map(|((_, off_m), ends, face)| {
-        let name = |region: usize| topology.region_names()[region].as_str();
-        let (own, other) = face.between;
-        let [a, b] = ends.map(|n| mesh.point(n));
-        CurvedFacets {
-            surface: format!("{}|{}", name(own), other.map_or("outside", name)),
-            off_m,
-            at_m: centroid([a, b]),
-        }
+    let found = CurvedSurfaces::new(topology, mesh.points(), counted(config, topology)).farthest()?;
+    let name = |region: RegionId| topology.region_names()[region.index()].as_str();
+    let (own, other) = found.between;
+    Some(CurvedFacets {
+        surface: format!("{}|{}", name(own), other.map_or("outside", name)),
+        off_m: found.off,
+        at_m: centroid(found.ends.map(|n| mesh.point(n))),
+        change: None,
     })
 }
 
+/// Which surfaces count, by the regions on both sides: none between two regions that are empty, where nothing changes, nor the end
+/// of open space, whose shell maps its own shape.
+fn counted(config: &Config, topology: &Topology) -> impl Fn(RegionId, Option<RegionId>) -> bool {
+    let of = |is: &dyn Fn(&str) -> bool| -> Vec<bool> {
+        topology.region_names().iter().map(|name| is(name)).collect()
+    };
+    let (empty, open) = (of(&|name| is_empty(config, name)), of(&|name| is_open(config, name)));
+    move |own, other| match other {
+        Some(other) => !(empty[own.index()] && empty[other.index()]),
+        None => !open[own.index()],
+    }
+}
+
 /// Whether a region is air in which nothing flows and nothing is measured.
-pub(super) fn is_empty(config: &Config, name: &str) -> bool {
+fn is_empty(config: &Config, name: &str) -> bool {
     is_air(config, name)
         && !is_wound(config, name)
         && !config.forces.iter().any(|body| body.regions.iter().any(|own| own == name))
         && !functionals(config).iter().any(|(_, own)| own.region.as_deref() == Some(name))
 }
 
-/// What no refinement takes away, in words.
-pub(super) fn described(found: &CurvedFacets) -> String {
-    format!(
-        "`{}` is curved, and its facets are up to {:.3} mm off it, at {}: no error bar counts that, and refined meshes and cut \
-         elements keep the facets; begin with smaller faces there to see what it does",
+/// What no refinement takes away, in words; of these objectives of one design or of two.
+fn described(found: &CurvedFacets, objectives: &[f64]) -> String {
+    let head = format!(
+        "`{}` is curved, and its facets are up to {:.3} mm off it, at {}",
         found.surface,
         Millimetres(found.off_m),
         millimetres(found.at_m)
+    );
+    let percent = |change: f64, of: f64| format!("{:+.2} %", 100.0 * change / of);
+    let what = match (found.change, objectives) {
+        (Some([change, _]), &[objective]) => format!(
+            "on it in the mean they change the objective by about {}",
+            percent(change, objective.abs())
+        ),
+        (Some([first, last]), &[initial, best]) => {
+            let ratio = best / initial;
+            format!(
+                "on it in the mean they change the objective by about {} at the initial and {} at the best design, F/F0 by {}",
+                percent(first, initial.abs()),
+                percent(last, best.abs()),
+                percent((best + last) / (initial + first) - ratio, ratio)
+            )
+        }
+        _ => {
+            return format!(
+                "{head}: no error bar counts that, and refined meshes and cut elements keep the facets; begin with smaller faces there \
+             to see what it does"
+            );
+        }
+    };
+    format!(
+        "{head}: {what}, which no error bar counts and no refinement takes away; begin with smaller faces there"
     )
 }
 
-#[cfg(test)]
-mod tests {
-    use fluxmorph_geometry::generate::{BlockParameters, SphereParameters, block, sphere};
-    use fluxmorph_geometry::refine::{RefineLimits, uniform};
-
-    use super::*;
-
-    /// The edges of a ball's facets are `L²/(8R)` off; halved edges lie on the same facets, and the angles say the same of them to
-    /// what a facet hides; a block is not curved.
-    #[test]
-    fn the_facets_of_a_ball_are_off_it_by_the_height_of_their_arcs() {
-        let parameters = SphereParameters { radius: 0.05, divisions: 6, ..SphereParameters::default() };
-        let mesh = sphere(&parameters).expect("a ball");
-        let found = curved_facets(&mesh, |_| false).expect("it is curved");
-        // The outer sphere is the larger one, and only the outside.
-        assert_eq!(found.surface, "air|sphere");
-        let radius = parameters.radius;
-        let [ball, air] = ["sphere", "air"].map(|name| mesh.topology().region(name).expect("it has both"));
-        let surface = mesh.topology().interface(ball, air);
-        let edges = surface.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        let middle = |(a, b)| radius - norm(centroid([mesh.point(a), mesh.point(b)]));
-        let height = edges.map(middle).fold(0.0, f64::max);
-        assert!((found.off_m / height - 1.0).abs() < 0.1, "{} {height}", found.off_m);
-        assert!((radius - norm(found.at_m) - height).abs() < 0.2 * height);
-        let finer = uniform(&mesh, RefineLimits::default()).expect("finer");
-        let kept = curved_facets(finer.mesh(), |_| false).expect("it is curved");
-        assert!(kept.off_m > 0.1 * height, "{} {height}", kept.off_m);
-        let outside = curved_facets(&mesh, |_| true).expect("it is a ball as a whole");
-        assert_eq!(outside.surface, "air|outside");
-        let flat = block(&BlockParameters { size: [0.1; 3], cells: [3; 3] }).expect("a block");
-        assert_eq!(curved_facets(&flat, |_| false), None);
+impl Session<'_> {
+    /// What no estimate and no refinement has of the geometry, initially and at a `shape` with facets of its own, with what it does
+    /// to the objective of some shapes, one or two, each the mesh that it was solved on; which is reported.
+    pub(super) fn facets_of(
+        &self,
+        shape: Option<&Mesh>,
+        shapes: &[(&Mesh, f64)],
+        observer: &mut dyn Observer,
+    ) -> Option<CurvedFacets> {
+        let first = self.facets.as_ref()?;
+        let of_shape = shape.and_then(|mesh| farthest(self.config, mesh));
+        let mut found =
+            of_shape.filter(|own| own.off_m > first.farthest.off_m).unwrap_or_else(|| first.farthest.clone());
+        if !shapes.is_empty() {
+            observer.phase("measuring what the facets of curved surfaces change");
+            found.change = match self.changes(first, shapes) {
+                Ok(changes) => changes.map(|changes| [changes[0], changes[shapes.len() - 1]]),
+                Err(error) => {
+                    observer
+                        .notice(&format!("what the facets of curved surfaces change is not known: {error}"));
+                    None
+                }
+            };
+        }
+        let objectives: Vec<f64> = shapes.iter().map(|(_, objective)| *objective).collect();
+        observer.notice(&described(&found, &objectives));
+        Some(found)
     }
+
+    /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about.
+    /// `None` where elements are too thin for that, or a signal comes first.
+    fn changes(&self, first: &FirstFacets, shapes: &[(&Mesh, f64)]) -> Result<Option<Vec<f64>>, Error> {
+        let (config, full) = (self.config, &self.setup.full_mesh);
+        let remaining = remaining_nodes(config, full.topology());
+        let of_shape = |shape: &Mesh| -> Vec<Point> {
+            let mut points = full.points().to_vec();
+            remaining.iter().zip(shape.points()).for_each(|(node, point)| points[node.index()] = *point);
+            let motion = first.onto_surfaces(config, &points);
+            remaining.iter().map(|node| motion[node.index()]).collect()
+        };
+        let of_full = first.onto_surfaces(config, full.points());
+        let of_shapes: Vec<Vec<Point>> = shapes.iter().map(|(shape, _)| of_shape(shape)).collect();
+        let motions = shapes.iter().zip(&of_shapes).map(|((shape, _), motion)| (*shape, motion));
+        let Some(part) = part_of_the_way(motions.chain([(full, &of_full)])) else { return Ok(None) };
+        let moved = |mesh: &Mesh, motion: &[Point]| {
+            let motion: Vec<Point> = motion.iter().map(|m| m.map(|c| part * c)).collect();
+            mesh.moved(&motion).map_err(OptimizerError::from)
+        };
+        let config = looked_at_once(Config { constraints: Vec::new(), ..config.clone() });
+        let problem = FinerProblem::new(&config, self.source, &moved(full, &of_full)?, Cut::Halvings(0))?;
+        memory_limit::check_problem(&problem.setup.problem, self.source, OverwritePolicy::Keep)?;
+        let (cache, mut changes) = (&mut SolverCache::default(), Vec::new());
+        for ((shape, objective), motion) in shapes.iter().zip(&of_shapes) {
+            if (self.interrupted)() {
+                return Ok(None);
+            }
+            let found = problem.analyse(&moved(shape, motion)?, cache)?.objective.unwrap_or(f64::NAN);
+            changes.push((found - objective) / part);
+        }
+        Ok(Some(changes))
+    }
+}
+
+/// The largest part of motions, halved as often as it takes, that leaves every element enough of its volume.
+fn part_of_the_way<'a>(motions: impl Iterator<Item = (&'a Mesh, &'a Vec<Point>)>) -> Option<f64> {
+    let mut part: f64 = 1.0;
+    for (mesh, motion) in motions {
+        let topology = mesh.topology();
+        for e in topology.elements() {
+            let (nodes, vertices) = (topology.tet(e), mesh.vertices(e));
+            let at = |part: f64| {
+                let of = |a: usize, d: usize| vertices[a][d] + part * motion[nodes[a].index()][d];
+                volume(std::array::from_fn(|a| std::array::from_fn(|d| of(a, d))))
+            };
+            while at(part) < KEPT_VOLUME * volume(vertices) {
+                part /= 2.0;
+                if part < LEAST_PART {
+                    return None;
+                }
+            }
+        }
+    }
+    Some(part)
 }

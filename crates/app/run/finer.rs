@@ -88,6 +88,11 @@ impl FinerProblem {
         Ok(Self { setup, refinement, coarse, remaining })
     }
 
+    /// Of every node that the mesh has more than the one that was cut, the two in whose middle it lies.
+    pub fn parents(&self) -> &[[NodeId; 2]] {
+        self.refinement.parents()
+    }
+
     /// The finer mesh of a shape, given by the mesh that was solved on.
     ///
     /// # Errors

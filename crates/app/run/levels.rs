@@ -12,7 +12,7 @@
 
 use std::time::Instant;
 
-use fluxmorph_geometry::ElementId;
+use fluxmorph_geometry::{ElementId, NodeId};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{Observer, Standing, StopReason, Supervisor};
 use fluxmorph_optimizer::memory_estimate::Sizes;
@@ -105,6 +105,11 @@ impl<'a> Levels<'a> {
     /// Whether the run had refined its mesh before it was interrupted.
     pub(super) fn has_kept(&self) -> bool {
         !self.kept.refinements.is_empty()
+    }
+
+    /// Of every node that the mesh of the configuration does not have, the two in whose middle it lies.
+    pub(super) fn parents(&self) -> &[[NodeId; 2]] {
+        self.mesh.parents()
     }
 
     /// How the mesh was refined.

@@ -33,6 +33,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use confirmation::ShapeMeshes;
+use facets::FirstFacets;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -51,8 +52,8 @@ use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{
-    CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements,
-    RunDirectory, RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
+    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements, RunDirectory,
+    RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
@@ -135,8 +136,8 @@ struct Session<'a> {
     setup: Setup,
     /// What the set-up of the mesh of the configuration has warned of.
     warnings: Vec<String>,
-    /// Of the mesh before it was refined.
-    facets: Option<CurvedFacets>,
+    /// Of the mesh before it was refined; `None` where no surface is curved.
+    facets: Option<FirstFacets>,
     /// What no estimate has of a wall that is near, in words.
     near_wall: Option<String>,
     directory: RunDirectory,
@@ -193,7 +194,9 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         let config = self.config;
-        let Searched { optimised, first, at_best, refinements } = self.search(&mut recorder, observer)?;
+        let Searched { optimised, first, at_best, refinements, parents } =
+            self.search(&mut recorder, observer)?;
+        self.facets = self.facets.take().map(|facets| facets.refined(parents));
         let best = &optimised.best;
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, &self.setup.problem, &best.analysis)?;

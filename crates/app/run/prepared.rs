@@ -5,12 +5,12 @@ use std::time::Instant;
 use fluxmorph_geometry::parallel::RankGroup;
 use fluxmorph_optimizer::Error as OptimizerError;
 
-use super::facets::{curved_facets, is_empty};
+use super::facets::FirstFacets;
 use super::{Options, Session, mesh_hash, table_hashes};
 use crate::build::{Mode, Setup, Truncation, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{CurvedFacets, LimitsInForce, Manifest, MeshHash, RunDirectory, surface_files};
+use crate::files::{LimitsInForce, Manifest, MeshHash, RunDirectory, surface_files};
 use crate::show::RunObserver;
 
 /// A problem that is set up, and what its set-up was given.
@@ -18,8 +18,8 @@ pub(super) struct Prepared<'a> {
     pub(super) setup: Setup,
     config: &'a Config,
     source: &'a SourceMap,
-    /// Of the mesh before it is refined.
-    facets: Option<CurvedFacets>,
+    /// Of the mesh before it is refined; `None` where no surface is curved.
+    pub(super) facets: Option<FirstFacets>,
     near_wall: Option<String>,
     options: Options<'a>,
     clock: Instant,
@@ -40,7 +40,7 @@ impl<'a> Prepared<'a> {
         let setup = set_up_watched(config, source, mode, options.ranks, stages)?;
         memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
-        let facets = curved_facets(&setup.full_mesh, |name| is_empty(config, name));
+        let facets = FirstFacets::of(config, &setup.full_mesh);
         let near_wall = Truncation::of(&setup).and_then(|truncation| truncation.described());
         Ok(Self { setup, config, source, facets, near_wall, options, clock })
     }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
+use fluxmorph_geometry::NodeId;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason, Supervisor, Unsupervised};
 use fluxmorph_optimizer::problem::{Derivatives, ErrorEstimate, NoProgress, SolverCache};
@@ -26,6 +27,8 @@ pub(super) struct Searched {
     pub(super) at_best: Option<ErrorEstimate>,
     /// How the mesh was refined; `None` without a tolerance.
     pub(super) refinements: Option<Refinements>,
+    /// Of every node that the mesh of the configuration does not have, the two in whose middle it lies.
+    pub(super) parents: Vec<[NodeId; 2]>,
 }
 
 /// The time of a run: that of what it computes, refinements included, and not of what it repeats from its journal.
@@ -114,8 +117,9 @@ impl<'a> Session<'a> {
                     if let Some(levels) = &mut levels {
                         optimised.warnings.append(&mut levels.warnings);
                     }
+                    let parents = levels.as_ref().map_or_else(Vec::new, |levels| levels.parents().to_vec());
                     let refinements = levels.map(Levels::into_refinements);
-                    return Ok(Searched { optimised, first, at_best, refinements });
+                    return Ok(Searched { optimised, first, at_best, refinements, parents });
                 }
             }
             start = Start {

@@ -1,5 +1,6 @@
 //! One analysis with its directory: the field of a single design.
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
 use fluxmorph_remesh::Moved;
@@ -46,6 +47,7 @@ pub fn solve(
         let finer = FinerProblem::new(config, source, &prepared.setup.full_mesh, cut)?;
         moved = finer.moved(&moved.mesh)?;
         initial = initial.map(|initial| finer.moved(&initial.mesh)).transpose()?;
+        prepared.facets = prepared.facets.map(|facets| facets.refined(finer.parents().to_vec()));
         prepared.setup = finer.setup;
         memory_limit::check_problem(&prepared.setup.problem, source, options.overwrite_policy)?;
     }
@@ -108,18 +110,21 @@ impl Session<'_> {
         exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
-        let accuracy = estimate.and_then(|estimate| {
+        let accuracy = (estimate.is_some() || self.is_geometry_looked_at()).then(|| {
+            let objective = analysis.objective.filter(|_| self.has_field_objective());
+            let shapes: Vec<(&Mesh, f64)> = objective.iter().map(|&value| (&analysis.mesh, value)).collect();
             let known = Accuracy {
                 refinements: halvings as usize,
-                facets: self.facets_of(None, observer),
+                facets: self.facets_of(None, &shapes, observer),
                 near_wall: self.near_wall_noted(observer),
                 ..Accuracy::default()
             };
-            match analysis.objective.filter(|_| self.has_field_objective()) {
-                Some(value) => Some(known.of_analysis(value, estimate.objective)),
-                None => Some(known).filter(Accuracy::says_something_of_the_geometry),
+            match (objective, estimate) {
+                (Some(value), Some(estimate)) => Some(known.of_analysis(value, estimate.objective)),
+                _ => Some(known).filter(Accuracy::says_something_of_the_geometry),
             }
         });
+        let accuracy = accuracy.flatten();
         Ok(RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {

@@ -7,6 +7,7 @@
 //! share, as the paper's appendix suggests.
 
 pub mod box_tree;
+pub mod curved;
 pub mod depth;
 #[cfg(test)]
 mod determinism;
