@@ -86,13 +86,20 @@ impl Curves {
                 )
             })
         };
+        let falling = |(name, curve): (&String, &Arc<BhCurve>)| {
+            let [h, b] = curve.falling_polarisation()?;
+            Some(format!(
+                "materials.{name}: B rises by less than μ0 H up to the point of {h} A/m and {b} T of the B–H curve, so that the \
+                 polarisation falls there, as that of no steel does: a saturated one goes on with μ0 = 1.2566e-6 T/(A/m)"
+            ))
+        };
         let approximation = (!self.is_static && self.curves.keys().any(used)).then(|| {
             "iron with a B–H curve above 0 Hz: the largest and the least |B| of a period follow the curve, and of what alternates \
              the fundamental alone is computed (effective reluctivity); that is an approximation"
                 .to_owned()
         });
         let of_curves = self.curves.iter().filter(|(name, _)| used(name));
-        let of_curves = of_curves.flat_map(|own| [steep(own), warning(own)]);
+        let of_curves = of_curves.flat_map(|own| [steep(own), falling(own), warning(own)]);
         of_curves.flatten().chain(approximation).collect()
     }
 }

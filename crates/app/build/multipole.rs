@@ -32,12 +32,7 @@ fn parse(text: &str) -> Option<Harmonic> {
 
 /// A term as it is written.
 pub(crate) fn name(term: Harmonic) -> String {
-    match term {
-        Harmonic::Normal(n) => format!("b{n}"),
-        Harmonic::Skew(n) => format!("a{n}"),
-        Harmonic::Cosine(n, m) => format!("c{n}_{m}"),
-        Harmonic::Sine(n, m) => format!("s{n}_{m}"),
-    }
+    term.to_string()
 }
 
 /// All terms of an expansion, in its order.

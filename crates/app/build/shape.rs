@@ -24,6 +24,9 @@ use crate::error::Error;
 /// Sine of the angle to a plane up to which a direction is along it: files carry few digits, and their facets differ by that.
 const ALONG: f64 = 1e-3;
 
+/// Cosine of the angle to the motion of the design up to which a face lies across it.
+const ACROSS: f64 = 0.7;
+
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {
     pub(super) source: &'a SourceMap,
@@ -71,6 +74,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
     warnings.extend(held_warning(inputs.remesh, mesh, &surface));
     warnings.extend(slid_warning(inputs.remesh, design));
+    warnings.extend(opposite_warning(inputs.remesh, mesh, &surface));
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
     warnings.extend(unused_keys(source, inputs.remesh, law));
@@ -194,6 +198,26 @@ fn slid_warning(remesh: &Remesh, design: &Design) -> Vec<String> {
         )
     };
     designed.map(text).collect()
+}
+
+/// Faces in `remesh.free` that lie across the motion of the design, such as the far side of a plate: they follow it, so that its
+/// thickness is not what the variables say.
+fn opposite_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
+    let Some(along) = surface.directions().iter().find(|d| norm(**d) > 0.0) else { return Vec::new() };
+    let is_designed = |n: &NodeId| surface.nodes().binary_search(n).is_ok();
+    let of = |free: &String| {
+        let across = |face: &&[NodeId; 3]| {
+            let normal = area_vector(face.map(|n| mesh.point(n)));
+            !face.iter().any(is_designed) && dot(normal, *along).abs() > ACROSS * norm(normal) * norm(*along)
+        };
+        let face = mesh.topology().surface(free).ok()?.iter().find(across)?;
+        Some(format!(
+            "`{free}` in remesh.free has faces across the motion of the design that are no part of it, as at {}: they move along with \
+             it, and a wall between keeps its thickness; where they are to stay, name them in remesh.fixed or remesh.slide",
+            millimetres(centroid(face.map(|n| mesh.point(n))))
+        ))
+    };
+    remesh.free.iter().filter_map(of).collect()
 }
 
 /// Faces in `remesh.free` whose other side is no part of the elastic body.

@@ -10,15 +10,25 @@ use crate::build::{Mode, variable_count};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{Manifest, RunDirectory, read_design, system_disk};
+use crate::files::{FileHash, Manifest, RunDirectory, read_design, system_disk};
 use crate::run;
 
+/// What is analysed.
+struct Subject {
+    config: Config,
+    source: SourceMap,
+    /// The file of the design; `None` for the initial one.
+    design: Option<PathBuf>,
+    /// The B–H tables that the run of the configuration has read; empty without a run.
+    tables: Vec<FileHash>,
+}
+
 /// The configuration to analyse, and the design file: of the result of a run, its configuration and its design.
-fn subject(args: &SolveArgs) -> Result<(Config, SourceMap, Option<PathBuf>), Error> {
+fn subject(args: &SolveArgs) -> Result<Subject, Error> {
     let path = &args.common.config;
     if path.file_name() != Some(OsStr::new("result.json")) {
         let (config, source) = args.common.load()?;
-        return Ok((config, source, args.design.clone()));
+        return Ok(Subject { config, source, design: args.design.clone(), tables: Vec::new() });
     }
     // A bare name has an empty folder.
     let folder = std::path::absolute(path).unwrap_or_else(|_| path.clone());
@@ -32,17 +42,21 @@ fn subject(args: &SolveArgs) -> Result<(Config, SourceMap, Option<PathBuf>), Err
     beside.push("_solved");
     config.output.directory = beside.into();
     let (config, source) = args.common.checked(config, source)?;
-    Ok((config, source, Some(args.design.clone().unwrap_or_else(|| path.clone()))))
+    let design = Some(args.design.clone().unwrap_or_else(|| path.clone()));
+    Ok(Subject { config, source, design, tables: manifest.tables })
 }
 
 /// Do what the command line says.
 pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
-    let (config, source, design) = subject(args)?;
+    let Subject { config, source, design, tables } = subject(args)?;
     let work = &args.common.work;
     on_all((&config, &source, Mode::Analysis), work, &signal, |options, mut observer| {
         let design = match &design {
-            Some(path) => Some(read_design(path, variable_count(&config, &source)?)?),
+            Some(path) => {
+                let design = read_design(path, variable_count(&config, &source)?)?;
+                Some(design.of_run(tables.clone()))
+            }
             None => None,
         };
         let result = run::solve(&config, &source, (design, args.refine), options, &mut *observer)?;

@@ -1,5 +1,6 @@
 //! Reads a design: a `result.json`, or a JSON array of lengths in metres.
 
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,7 @@ use fluxmorph_optimizer::design::DesignSurface;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::json_place;
+use super::{FileHash, json_place};
 use crate::config::{Diagnostic, DiagnosticReport, Document, Span, Subject};
 
 /// Largest design file that is read [bytes]: a million variables with their points.
@@ -52,6 +53,12 @@ pub enum DesignFileError {
         /// Where it acts here [m].
         expected: [f64; 3],
     },
+    /// A B–H table is not what the run of the design has read.
+    #[error(
+        "the B–H table `{}` is another than the one that the run of `{path}` has read; restore it, or analyse the configuration \
+         with --design to take the design to another steel", table.display()
+    )]
+    Table { path: PathBuf, table: PathBuf },
 }
 
 /// Largest distance between two places of a variable, relative to the diagonal of the mesh: far above what writing and
@@ -66,9 +73,32 @@ pub struct DesignFile {
     pub values: Vec<f64>,
     /// Where the variables act [m]; `None` where the file does not say.
     points: Option<Vec<[f64; 3]>>,
+    /// The B–H tables of its run with their hashes; empty where it is taken to another configuration.
+    tables: Vec<FileHash>,
 }
 
 impl DesignFile {
+    /// The same, for the configuration of its run, which has read these B–H tables.
+    #[must_use]
+    pub fn of_run(self, tables: Vec<FileHash>) -> Self {
+        Self { tables, ..self }
+    }
+
+    /// Whether tables with these hashes of their content are those that its run has read; others have other names.
+    ///
+    /// # Errors
+    /// [`DesignFileError::Table`].
+    pub fn check_tables(&self, read: &BTreeMap<PathBuf, String>) -> Result<(), DesignFileError> {
+        let is_other =
+            |own: &&FileHash| read.get(Path::new(&own.path)).is_some_and(|hash| *hash != own.blake3);
+        match self.tables.iter().find(is_other) {
+            None => Ok(()),
+            Some(own) => {
+                Err(DesignFileError::Table { path: self.path.clone(), table: PathBuf::from(&own.path) })
+            }
+        }
+    }
+
     /// Whether its variables act where those of a surface do; a list without places does.
     ///
     /// # Errors
@@ -145,7 +175,7 @@ pub fn read_design(path: &Path, expected: usize) -> Result<DesignFile, DesignFil
             Some(points).filter(|points| points.len() == expected)
         }
     };
-    Ok(DesignFile { path: path.to_owned(), values, points })
+    Ok(DesignFile { path: path.to_owned(), values, points, tables: Vec::new() })
 }
 
 #[cfg(test)]
@@ -180,5 +210,20 @@ mod tests {
             read_design(folder.path().join("none").as_path(), 1),
             Err(DesignFileError::Read { .. })
         ));
+    }
+
+    #[test]
+    fn a_table_that_its_run_has_not_read_is_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("result.json");
+        std::fs::write(&path, "[0.01]").expect("written");
+        let read = |name: &str, hash: &str| BTreeMap::from([(PathBuf::from(name), hash.to_owned())]);
+        let design = read_design(&path, 1).expect("a design");
+        design.check_tables(&read("steel.csv", "b")).expect("one of no run");
+        let design = design.of_run(vec![FileHash { path: "steel.csv".to_owned(), blake3: "a".to_owned() }]);
+        design.check_tables(&read("steel.csv", "a")).expect("its own");
+        design.check_tables(&read("other.csv", "b")).expect("another material");
+        let error = design.check_tables(&read("steel.csv", "b")).expect_err("changed").to_string();
+        assert!(error.contains("the B–H table `steel.csv` is another"), "{error}");
     }
 }

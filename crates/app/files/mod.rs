@@ -87,6 +87,11 @@ pub enum OutputError {
         "`{path}` is a link, and nothing is written through links; remove it; a new run may write elsewhere with --out"
     )]
     Linked { path: PathBuf },
+    /// A folder to be made is a link to one that is missing.
+    #[error(
+        "`{path}` is a link to something that is missing; make that folder, remove the link, or write elsewhere with --out"
+    )]
+    DeadLink { path: PathBuf },
     /// A file of a run does not hold what it should.
     #[error("`{path}` is damaged: {message}; it must be a file as fluxmorph wrote it")]
     Damaged { path: PathBuf, message: String },

@@ -189,6 +189,10 @@ impl RunDirectory {
                 && names.is_err_and(|error| error.kind() == io::ErrorKind::NotFound)
         };
         let missing = path.ancestors().skip(1).take_while(is_missing).count();
+        // A link that leads nowhere is missing, and cannot be made.
+        if let Some(link) = path.ancestors().take(missing + 1).find(|folder| self.disk.is_link(folder)) {
+            return Err(OutputError::DeadLink { path: link.to_owned() });
+        }
         self.disk.create_dir(path).map_err(OutputError::io("create", path))?;
         for folder in path.ancestors().take(missing + 1) {
             match self.disk.sync_dir(folder_of(folder)) {
@@ -442,6 +446,20 @@ mod tests {
         RunDirectory::create(&system_disk(), &path, OverwritePolicy::Replace).expect("replaced");
         assert!(!ours.exists() && !optimum.exists());
         assert!(theirs.exists() && folder.path().join("stay.stl").exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_leads_nowhere_is_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(folder.path().join("missing"), &link).expect("linked");
+        for path in [link.clone(), link.join("run")] {
+            let error =
+                RunDirectory::create(&system_disk(), &path, OverwritePolicy::Keep).expect_err("a dead link");
+            assert!(matches!(&error, OutputError::DeadLink { path } if *path == link), "{error}");
+        }
+        assert!(!folder.path().join("missing").exists());
     }
 
     #[cfg(unix)]

@@ -32,20 +32,19 @@ pub(super) struct FirstFacets {
     mesh: Mesh,
     /// Of every node that the mesh has more by now, the two in whose middle it lies.
     parents: Vec<[NodeId; 2]>,
-    farthest: CurvedFacets,
+    /// Those farthest off their surface; `None` where none is curved.
+    farthest: Option<CurvedFacets>,
 }
 
 impl FirstFacets {
-    /// Those of a mesh; `None` where no surface that counts is curved.
-    pub(super) fn of(config: &Config, mesh: &Mesh) -> Option<Self> {
-        let farthest = farthest(config, mesh)?;
-        Some(Self { mesh: mesh.clone(), parents: Vec::new(), farthest })
+    /// Those of a mesh.
+    pub(super) fn of(config: &Config, mesh: &Mesh) -> Self {
+        Self { mesh: mesh.clone(), parents: Vec::new(), farthest: farthest(config, mesh) }
     }
 
-    /// The same of a mesh whose nodes these parents have by now.
-    #[must_use]
-    pub(super) fn refined(self, parents: Vec<[NodeId; 2]>) -> Self {
-        Self { parents, ..self }
+    /// Goes on to a finer mesh, whose new nodes have these parents.
+    pub(super) fn refine(&mut self, parents: Vec<[NodeId; 2]>) {
+        self.parents = parents;
     }
 
     /// The motion of all nodes [m] that brings the facets onto their surfaces, where the nodes lie so [m]; new ones stay in the middle.
@@ -103,21 +102,19 @@ fn described(found: &CurvedFacets, objectives: &[f64]) -> String {
         Millimetres(found.off_m),
         millimetres(found.at_m)
     );
-    let percent = |change: f64, of: f64| format!("{:+.2} %", 100.0 * change / of);
+    let percent = |change: f64, of: f64| format!("{:+.2} %", 100.0 * change / of.abs());
     let what = match (found.change, objectives) {
-        (Some([change, _]), &[objective]) => format!(
-            "on it in the mean they change the objective by about {}",
-            percent(change, objective.abs())
-        ),
-        (Some([first, last]), &[initial, best]) => {
-            let ratio = best / initial;
-            format!(
-                "on it in the mean they change the objective by about {} at the initial and {} at the best design, F/F0 by {}",
-                percent(first, initial.abs()),
-                percent(last, best.abs()),
-                percent((best + last) / (initial + first) - ratio, ratio)
-            )
+        (Some([change, _]), &[objective]) => {
+            format!("on it in the mean they change the objective by about {}", percent(change, objective))
         }
+        (Some([first, last]), &[initial, best]) => format!(
+            "on it in the mean they change the objective by about {} at the initial and {} at the best design, relative to the \
+             larger of both, and F/F0 from {:.5} to {:.5}",
+            percent(first, initial),
+            percent(last, initial.abs().max(best.abs())),
+            best / initial,
+            (best + last) / (initial + first)
+        ),
         _ => {
             return format!(
                 "{head}: no error bar counts that, and refined meshes and cut elements keep the facets; begin with smaller faces there \
@@ -139,13 +136,13 @@ impl Session<'_> {
         shapes: &[(&Mesh, f64)],
         observer: &mut dyn Observer,
     ) -> Option<CurvedFacets> {
-        let first = self.facets.as_ref()?;
+        let own = self.facets.farthest.clone();
         let of_shape = shape.and_then(|mesh| farthest(self.config, mesh));
-        let mut found =
-            of_shape.filter(|own| own.off_m > first.farthest.off_m).unwrap_or_else(|| first.farthest.clone());
+        let off = |facets: &Option<CurvedFacets>| facets.as_ref().map_or(0.0, |facets| facets.off_m);
+        let mut found = if off(&of_shape) > off(&own) { of_shape } else { own }?;
         if !shapes.is_empty() {
             observer.phase("measuring what the facets of curved surfaces change");
-            found.change = match self.changes(first, shapes) {
+            found.change = match self.changes(shapes) {
                 Ok(changes) => changes.map(|changes| [changes[0], changes[shapes.len() - 1]]),
                 Err(error) => {
                     observer
@@ -161,8 +158,8 @@ impl Session<'_> {
 
     /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about.
     /// `None` where elements are too thin for that, or a signal comes first.
-    fn changes(&self, first: &FirstFacets, shapes: &[(&Mesh, f64)]) -> Result<Option<Vec<f64>>, Error> {
-        let (config, full) = (self.config, &self.setup.full_mesh);
+    fn changes(&self, shapes: &[(&Mesh, f64)]) -> Result<Option<Vec<f64>>, Error> {
+        let (config, full, first) = (self.config, &self.setup.full_mesh, &self.facets);
         let remaining = remaining_nodes(config, full.topology());
         let of_shape = |shape: &Mesh| -> Vec<Point> {
             let mut points = full.points().to_vec();
@@ -183,6 +180,10 @@ impl Session<'_> {
         memory_limit::check_problem(&problem.setup.problem, self.source, OverwritePolicy::Keep)?;
         let (cache, mut changes) = (&mut SolverCache::default(), Vec::new());
         for ((shape, objective), motion) in shapes.iter().zip(&of_shapes) {
+            if motion.iter().all(|own| *own == [0.0; 3]) {
+                changes.push(0.0);
+                continue;
+            }
             if (self.interrupted)() {
                 return Ok(None);
             }

@@ -136,8 +136,7 @@ struct Session<'a> {
     setup: Setup,
     /// What the set-up of the mesh of the configuration has warned of.
     warnings: Vec<String>,
-    /// Of the mesh before it was refined; `None` where no surface is curved.
-    facets: Option<FirstFacets>,
+    facets: FirstFacets,
     /// What no estimate has of a wall that is near, in words.
     near_wall: Option<String>,
     directory: RunDirectory,
@@ -196,7 +195,7 @@ impl Session<'_> {
         let config = self.config;
         let Searched { optimised, first, at_best, refinements, parents } =
             self.search(&mut recorder, observer)?;
-        self.facets = self.facets.take().map(|facets| facets.refined(parents));
+        self.facets.refine(parents);
         let best = &optimised.best;
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, &self.setup.problem, &best.analysis)?;

@@ -18,8 +18,7 @@ pub(super) struct Prepared<'a> {
     pub(super) setup: Setup,
     config: &'a Config,
     source: &'a SourceMap,
-    /// Of the mesh before it is refined; `None` where no surface is curved.
-    pub(super) facets: Option<FirstFacets>,
+    pub(super) facets: FirstFacets,
     near_wall: Option<String>,
     options: Options<'a>,
     clock: Instant,

@@ -29,6 +29,7 @@ pub fn solve(
     let problem = &mut prepared.setup.problem;
     if let (Some(shape), Some(design)) = (problem.shape(), &design) {
         design.check_places(shape.surface(), problem.original().bounding_box())?;
+        design.check_tables(&prepared.setup.tables)?;
     }
     let values = design_values(problem, design.map(|design| design.values), observer);
     // A design that breaks the mesh is refused before an earlier run is replaced.
@@ -47,7 +48,7 @@ pub fn solve(
         let finer = FinerProblem::new(config, source, &prepared.setup.full_mesh, cut)?;
         moved = finer.moved(&moved.mesh)?;
         initial = initial.map(|initial| finer.moved(&initial.mesh)).transpose()?;
-        prepared.facets = prepared.facets.map(|facets| facets.refined(finer.parents().to_vec()));
+        prepared.facets.refine(finer.parents().to_vec());
         prepared.setup = finer.setup;
         memory_limit::check_problem(&prepared.setup.problem, source, options.overwrite_policy)?;
     }

@@ -117,9 +117,9 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
     if is_run {
         rows.push(("evaluations", format!("{} ({} iterations)", result.evaluations, result.iterations)));
-        rows.push(("worst quality", format!("{last:.4}, was {first:.4}")));
+        rows.push(("worst quality", format!("{}, was {}", quality(last), quality(first))));
     } else {
-        rows.push(("worst quality", format!("{last:.4}")));
+        rows.push(("worst quality", quality(last)));
     }
     let method = result
         .linear_solver
@@ -262,6 +262,11 @@ fn homogeneity(objective: &ObjectiveResult) -> Option<Row> {
         state.unwrap_or_default()
     );
     Some(("homogeneity", text))
+}
+
+/// Quality of an element; of a sliver its size.
+fn quality(quality: f64) -> String {
+    if quality < 1e-3 { format!("{quality:.1e}") } else { format!("{quality:.4}") }
 }
 
 /// The frequencies of an analysis, and what was measured.

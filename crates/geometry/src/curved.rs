@@ -263,10 +263,11 @@ mod tests {
         assert!(surfaces(&flat).onto_surfaces().iter().all(|motion| *motion == [0.0; 3]));
     }
 
-    /// Its volume is then that of the ball but for what the next order leaves, its planes stay planes, and so do the elements.
+    /// Its volume is then that of the ball but for what the next order leaves, a share that falls with the size of the facets; its
+    /// planes stay planes.
     #[test]
     fn a_ball_whose_facets_lie_on_it_in_the_mean_has_its_volume() {
-        for (divisions, expected) in [(4, 0.09), (6, 0.06), (10, 0.04)] {
+        for divisions in [4, 6, 10] {
             let (mesh, ball) = ball(divisions);
             let motion = surfaces(&mesh).onto_surfaces();
             let moved = mesh.moved(&motion).expect("no element turns over");
@@ -277,7 +278,8 @@ mod tests {
             let exact = PI / 6.0 * 0.05f64.powi(3);
             let [before, after] = [&mesh, &moved].map(|mesh| of(mesh) / exact - 1.0);
             println!("{divisions}: {before:.5} {after:.5}");
-            assert!(before < 0.0 && after.abs() < expected * before.abs(), "{before} {after}");
+            let share = after.abs() / before.abs();
+            assert!(before < 0.0 && share < 0.2 / divisions as f64, "{before} {after}");
             for (point, motion) in mesh.points().iter().zip(&motion) {
                 assert!((0..3).all(|d| point[d] > 1e-9 || motion[d].abs() < 1e-15), "{point:?} {motion:?}");
             }

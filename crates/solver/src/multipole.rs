@@ -9,6 +9,8 @@
 //! Lives here: points and weights. Does not live here: the field at them ([`crate::recovery`]), functions of the coefficients
 //! ([`crate::functional`]).
 
+use std::fmt;
+
 use std::f64::consts::PI;
 
 use fluxmorph_geometry::fem::c64;
@@ -27,6 +29,18 @@ pub enum Harmonic {
     Cosine(usize, usize),
     /// `s_nm`, `1 ≤ m ≤ n`.
     Sine(usize, usize),
+}
+
+/// As it is written: `b3`, `a1`, `c2_0`, `s2_1`.
+impl fmt::Display for Harmonic {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Normal(n) => write!(f, "b{n}"),
+            Self::Skew(n) => write!(f, "a{n}"),
+            Self::Cosine(n, m) => write!(f, "c{n}_{m}"),
+            Self::Sine(n, m) => write!(f, "s{n}_{m}"),
+        }
+    }
 }
 
 /// Where an expansion holds: inside a circle, or in a ball.

@@ -21,6 +21,10 @@ table! {
     /// in which the refinements count. Of the initial design every mesh has its own value, to which the ratios belong. Where the
     /// memory or `max_refinements` do not suffice, the run goes on with the mesh that it has, and says so.
     ///
+    /// Facets of curved surfaces are no error of the field, and refinements keep them. What they change is computed once more a design,
+    /// at the end of a run or an analysis with an objective, for elements of both orders unless `estimate` is `false`; it counts for
+    /// `tolerance`.
+    ///
     /// ```toml
     /// [accuracy]
     /// tolerance = "2 %"

@@ -144,6 +144,15 @@ impl BhCurve {
         Some(high)
     }
 
+    /// The first point `[H, B]` [A/m, T] of a table where the polarisation `B − μ0 H` is more than a hundredth less than before it, which
+    /// no magnetic material has; `None` where there is none.
+    pub fn falling_polarisation(&self) -> Option<[f64; 2]> {
+        match &self.0 {
+            Law::Table(table) => table.falling_polarisation(),
+            Law::Analytic(_) => None,
+        }
+    }
+
     /// Whether it goes on beyond its end as it comes there: a table that ends at less than twice the permeability of vacuum,
     /// `ΔB/ΔH < 2 μ0`.
     pub fn ends_saturated(&self) -> bool {

@@ -93,6 +93,9 @@ const LARGEST_PERMEABILITY: f64 = 1e7;
 /// Largest polarisation `B − μ0 H` of a table [T]: four times that of iron and cobalt. More is another unit.
 const LARGEST_POLARISATION: f64 = 10.0;
 
+/// Share of the largest polarisation below which a table's falls: the digits of measured ones leave less.
+const FALLING: f64 = 0.99;
+
 impl Table {
     /// From points `[H, B]` [A/m, T]; the origin may be among them.
     ///
@@ -174,6 +177,18 @@ impl Table {
         let least = self.slope.iter().copied().fold(f64::INFINITY, f64::min);
         let last_soft = self.slope.iter().rposition(|&slope| slope <= 10.0 * least);
         last_soft.and_then(|i| self.flux_density.get(i + 1)).copied().unwrap_or(self.end()[1])
+    }
+
+    /// The first point `[H, B]` where the polarisation is [`FALLING`] of the most before it, or less.
+    pub(super) fn falling_polarisation(&self) -> Option<[f64; 2]> {
+        let mut most = 0.0;
+        let mut points = self.field_strength.iter().zip(&self.flux_density);
+        let found = points.find(|&(h, b)| {
+            let polarisation = b - VACUUM_PERMEABILITY * h;
+            most = f64::max(most, polarisation);
+            polarisation < FALLING * most
+        });
+        found.map(|(&h, &b)| [h, b])
     }
 
     /// Whether the table ends at less than twice the permeability of vacuum, `ΔB/ΔH < 2 μ0`.
@@ -344,5 +359,17 @@ mod tests {
         );
         assert!(matches!(second([200.0, 15.0]), (1, BhFault::BeyondIron { .. })), "kilogauss");
         assert!(matches!(refused(&[[0.0, 0.0], [1e-3, 0.5], [2e-3, 1.0]]), (1, BhFault::BeyondIron { .. })));
+    }
+
+    #[test]
+    fn a_polarisation_falls_where_b_rises_by_less_than_vacuum_has() {
+        let falling = |b: f64| {
+            let points = [[0.0, 0.0], [100.0, 1.0], [500.0, 1.8], [1e5, b]];
+            Table::new(&points).expect("a law").falling_polarisation()
+        };
+        assert_eq!(falling(1.85), Some([1e5, 1.85]));
+        // What a saturated steel has, and less by what digits may leave.
+        let saturated = 1.8 + VACUUM_PERMEABILITY * (1e5 - 500.0);
+        assert_eq!((falling(saturated), falling(saturated - 0.01)), (None, None));
     }
 }

@@ -89,6 +89,12 @@ impl At<'_> {
     }
 }
 
+/// Share of the largest term of an expansion up to which its main order is rounding, or the error of the linear solver.
+const LEAST_MAIN: f64 = 1e-9;
+
+/// Content [1] up to which all of it is rounding: 1e-14 of the main order.
+const ROUNDING: f64 = 1e-28;
+
 /// The main terms of an expansion with their coefficients in a field.
 pub(super) struct MainField {
     domain: Domain,
@@ -364,8 +370,11 @@ impl MultipoleFunctional {
         let state = (state, model, mesh);
         let at = self.multipoles.places.at(state)?;
         let fields = at.flux_densities(state);
-        let (value, slopes) =
-            self.value(&self.multipoles.coefficients_of(&fields), model.angular_frequency());
+        let coefficients = self.multipoles.coefficients_of(&fields);
+        if let OfTerms::Content { main, .. } = &self.of {
+            check_main(main, &coefficients)?;
+        }
+        let (value, slopes) = self.value(&coefficients, model.angular_frequency());
         let mut by_fields = vec![[c64::default(); 3]; fields.len()];
         for ((_, weights), slope) in self.multipoles.terms.iter().zip(&slopes) {
             for (q, weight) in by_fields.iter_mut().zip(weights) {
@@ -405,11 +414,8 @@ impl MultipoleFunctional {
                 (parts.iter().map(|(value, _)| value).sum(), parts.iter().map(|(_, slope)| *slope).collect())
             }
             OfTerms::Content { terms, main } => {
-                let square = |of: &[Harmonic]| -> f64 {
-                    coefficients.iter().filter(|(term, _)| of.contains(term)).map(|(_, c)| c.norm_sqr()).sum()
-                };
-                let reference = square(main);
-                let content = square(terms) / reference;
+                let reference = square(main, coefficients);
+                let content = content(terms, coefficients, reference);
                 let slope = |(term, c): &(Harmonic, c64)| {
                     let own = if terms.contains(term) { 1.0 } else { 0.0 };
                     let compared = if main.contains(term) { content } else { 0.0 };
@@ -418,5 +424,58 @@ impl MultipoleFunctional {
                 (content, coefficients.iter().map(slope).collect())
             }
         }
+    }
+}
+
+/// Refuses a content that is compared with nothing but rounding.
+fn check_main(main: &[Harmonic], coefficients: &[(Harmonic, c64)]) -> Result<(), SolverError> {
+    let size = |(_, c): &&(Harmonic, c64)| c.norm();
+    let by_size = |a: &&(Harmonic, c64), b: &&(Harmonic, c64)| size(a).total_cmp(&size(b));
+    let largest = coefficients.iter().max_by(by_size);
+    let of_main = coefficients.iter().filter(|(term, _)| main.contains(term)).max_by(by_size);
+    let (Some(largest), Some(of_main)) = (largest, of_main) else { return Ok(()) };
+    if size(&of_main) > LEAST_MAIN * size(&largest) || size(&largest) == 0.0 {
+        return Ok(());
+    }
+    let of = |(term, c): &(Harmonic, c64)| format!("{:.1e} T of {term}", c.norm());
+    Err(SolverError::parameter(
+        "the main order of an expansion",
+        format!("{} beside {}", of(of_main), of(largest)),
+        "an order that the field has, as the others are compared with it; planes of symmetry may forbid one",
+    ))
+}
+
+/// `Σ |c|²` of some terms over that of the main order [1]; terms that symmetry forbids have zero.
+fn content(terms: &[Harmonic], coefficients: &[(Harmonic, c64)], reference: f64) -> f64 {
+    let content = square(terms, coefficients) / reference;
+    if content < ROUNDING { 0.0 } else { content }
+}
+
+/// `Σ |c|²` of some terms.
+fn square(terms: &[Harmonic], coefficients: &[(Harmonic, c64)]) -> f64 {
+    coefficients.iter().filter(|(term, _)| terms.contains(term)).map(|(_, c)| c.norm_sqr()).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A quadrupole whose main order was left at that of a dipole, and what symmetry forbids in it.
+    #[test]
+    fn nothing_is_compared_with_rounding_and_rounding_is_no_content() {
+        let field = [
+            (Harmonic::Normal(1), c64::new(-1.5e-16, 0.0)),
+            (Harmonic::Normal(2), c64::new(-0.634, 0.0)),
+            (Harmonic::Normal(6), c64::new(6e-5, 0.0)),
+        ];
+        let error = check_main(&[Harmonic::Normal(1)], &field).expect_err("rounding").to_string();
+        assert!(error.contains("1.5e-16 T of b1 beside 6.3e-1 T of b2"), "{error}");
+        let main = [Harmonic::Normal(2), Harmonic::Skew(2)];
+        check_main(&main, &field).expect("it has one");
+        check_main(&main, &[(Harmonic::Normal(2), c64::default())]).expect("there is no field at all");
+        let reference = square(&main, &field);
+        assert_eq!(content(&[Harmonic::Normal(1)], &field, reference), 0.0);
+        let found = content(&[Harmonic::Normal(6)], &field, reference);
+        assert!((found / (6e-5f64 / 0.634).powi(2) - 1.0).abs() < 1e-12, "{found}");
     }
 }
