@@ -52,6 +52,7 @@ pub fn solve(
         prepared.setup = finer.setup;
         memory_limit::check_problem(&prepared.setup.problem, source, options.overwrite_policy)?;
     }
+    prepared.setup.problem.respond_to_every_winding();
     let session = prepared.begin("solve", mesh, observer)?;
     let concluded = session.conclude(observer, |session, observer| {
         let problem = &session.setup.problem;

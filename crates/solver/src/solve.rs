@@ -80,14 +80,25 @@ impl FieldModel {
         method: Option<Method>,
         state: &mut FieldSolution,
     ) -> Result<(), SolverError> {
-        let missing: Vec<usize> =
-            (0..self.windings().count()).filter(|&k| state.response(k).is_none()).collect();
-        if missing.is_empty() || !self.is_linear() {
+        let is_missing = (0..self.windings().count()).any(|k| state.response(k).is_none());
+        if !is_missing || !self.is_linear() {
             return Ok(());
         }
         let cache = &mut LinearSolverCache::with_method(method);
         let mut system = self.prepare_with(self.assembled(mesh), cache)?;
-        missing.into_iter().try_for_each(|winding| self.respond(&mut system, winding, state))
+        self.respond_to_every_winding(&mut system, state)
+    }
+
+    /// The same with a system that is prepared.
+    ///
+    /// # Errors
+    /// As [`PreparedSystem::solve_field`].
+    pub fn respond_to_every_winding(
+        &self,
+        system: &mut PreparedSystem,
+        state: &mut FieldSolution,
+    ) -> Result<(), SolverError> {
+        (0..self.windings().count()).try_for_each(|winding| self.respond(system, winding, state))
     }
 
     /// Solves for 1 A in a winding by its place, which the state then holds as its response; again only where it does not yet.

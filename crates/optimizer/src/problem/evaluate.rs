@@ -12,7 +12,7 @@ use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
 use super::adjoint_accumulator::{AdjointAccumulator, Solved, Work, Worst};
 use super::progress::{Progress, Stage};
 use super::stopwatch::Stopwatch;
-use super::{Analysis, Measured, Problem, Shape, SolverCache, Timings, finite};
+use super::{Analysis, Measured, Problem, Responses, Shape, SolverCache, Timings, finite};
 use crate::body::{Body, BodyForce};
 use crate::constraint::{Constraint, Quantity};
 use crate::error::Error;
@@ -223,6 +223,13 @@ impl Problem {
                 for (sum, (k, term)) in sums.constrained.iter_mut().zip(&sums.fields) {
                     let name = format!("the constraint `{}`", self.constraints[*k].name);
                     sum.add(&name, work, &mut solved, &[*term], shape)?;
+                }
+                if self.responses == Responses::OfEveryWinding && solved.model.is_linear() {
+                    let mut clock = Stopwatch::start();
+                    let Solved { model, system, state, .. } = &mut solved;
+                    let responded = model.respond_to_every_winding(system, state);
+                    responded.map_err(finite::of_field("the field of 1 A in a winding", model))?;
+                    work.timings.state += clock.lap();
                 }
                 let Solved { system, state, .. } = solved;
                 solutions[index] = Some(state);

@@ -48,6 +48,16 @@ pub struct Problem {
     shape: Option<Shape>,
     share: Option<Ownership>,
     bodies: Vec<Body>,
+    responses: Responses,
+}
+
+/// To which windings of a linear state the fields of 1 A are solved for, while its factor is there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Responses {
+    /// Those whose inductances a functional is of.
+    OfFunctionals,
+    /// All.
+    OfEveryWinding,
 }
 
 impl Problem {
@@ -74,7 +84,8 @@ impl Problem {
             shape.is_some() || quantities.all(Quantity::is_of_field),
             "a body that is constrained can move"
         );
-        Self { original, states, objective, constraints, shape, share: None, bodies: Vec::new() }
+        let (share, bodies, responses) = (None, Vec::new(), Responses::OfFunctionals);
+        Self { original, states, objective, constraints, shape, share, bodies, responses }
     }
 
     /// The same with its work shared out among ranks.
@@ -89,14 +100,20 @@ impl Problem {
         Self { bodies, ..self }
     }
 
+    /// Analyses are to have the responses of every winding from now on.
+    pub fn respond_to_every_winding(&mut self) {
+        self.responses = Responses::OfEveryWinding;
+    }
+
     /// The same with other states.
     ///
     /// # Panics
     /// As [`Problem::new`].
     #[must_use]
     pub fn with_states(self, states: Vec<FieldModel>) -> Self {
-        let Self { original, objective, constraints, shape, share, bodies, .. } = self;
-        Self::new(original, states, objective, constraints, shape).shared_out(share).with_bodies(bodies)
+        let Self { original, objective, constraints, shape, share, bodies, responses, .. } = self;
+        let other = Self::new(original, states, objective, constraints, shape);
+        Self { responses, ..other.shared_out(share).with_bodies(bodies) }
     }
 
     /// Lets go of states, constraints and shape, which hold nearly all of the memory: the undeformed mesh is left, and
