@@ -116,7 +116,12 @@ impl Recorder for Tape {
 /// keeps it. A resumed run with more of them goes on from there.
 #[test]
 fn what_is_beyond_a_bound_by_little_is_taken_a_step_back() {
-    let (mut problem, own) = changed("busbar.toml", &[]);
+    // With an inner face that follows.
+    let follows = (
+        "slide = [\"y_min\", \"z_min\", \"z_max\", \"top_face\"]",
+        "slide = [\"y_min\", \"z_min\", \"z_max\"]\nfree = [\"bar|around\"]",
+    );
+    let (mut problem, own) = changed("busbar.toml", &[follows]);
     let mut run = |tape: &mut Tape, max_evaluations: usize| {
         let settings = Optimizer { algorithm: Algorithm::Slsqp, max_evaluations, ..own.clone() };
         let run = optimise(&mut problem, &settings.settings(), &mut Silent, tape, &|| false);

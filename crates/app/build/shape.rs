@@ -27,6 +27,9 @@ const ALONG: f64 = 1e-3;
 /// Cosine of the angle to the motion of the design up to which a face lies across it.
 const ACROSS: f64 = 0.7;
 
+/// Cosine of the angle up to which two directions of a design are one.
+const ALIKE: f64 = 0.99;
+
 /// What the shape is made from.
 pub(super) struct Inputs<'a> {
     pub(super) source: &'a SourceMap,
@@ -203,7 +206,12 @@ fn slid_warning(remesh: &Remesh, design: &Design) -> Vec<String> {
 /// Faces in `remesh.free` that lie across the motion of the design, such as the far side of a plate: they follow it, so that its
 /// thickness is not what the variables say.
 fn opposite_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
-    let Some(along) = surface.directions().iter().find(|d| norm(**d) > 0.0) else { return Vec::new() };
+    let directions = surface.directions().iter().filter(|d| norm(**d) > 0.0);
+    let Some(along) = directions.clone().next() else { return Vec::new() };
+    let is_along = |d: &Point| dot(*d, *along).abs() > ALIKE * norm(*d) * norm(*along);
+    if !directions.clone().all(is_along) {
+        return Vec::new();
+    }
     let is_designed = |n: &NodeId| surface.nodes().binary_search(n).is_ok();
     let of = |free: &String| {
         let across = |face: &&[NodeId; 3]| {

@@ -4,7 +4,7 @@
 use std::collections::HashSet;
 
 use fluxmorph_geometry::box_tree::AxisBox;
-use fluxmorph_geometry::tet4::{Point, norm};
+use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres};
 use fluxmorph_solver::coil::CoilShape;
@@ -22,6 +22,9 @@ const NEAR: f64 = 2.0;
 /// its square was 34 % low.
 const NEAR_IN_A_PLANE: f64 = 2.83;
 
+/// Share of the diagonal of the mesh that coordinates of a file may be off.
+const ROUNDING: f64 = 1e-9;
+
 /// The nearest wall that no coil, magnet, conductor or iron reaches.
 #[derive(Debug, Serialize)]
 pub(crate) struct Truncation {
@@ -29,7 +32,7 @@ pub(crate) struct Truncation {
     pub(crate) surface: String,
     /// From the box around coils and matter to it [m].
     pub(crate) distance_m: f64,
-    /// Half the diagonal of that box, with what planes of symmetry cut off, and without the depth of a plane device [m].
+    /// Half the diagonal of that box, with what planes of symmetry cut off [m].
     pub(crate) source_size_m: f64,
     /// In which so many of these are near.
     #[serde(skip)]
@@ -69,14 +72,12 @@ impl Truncation {
         let (surface, distance_m) = walls.min_by(|a, b| a.1.total_cmp(&b.1))?;
         // What a plane of symmetry cuts goes on behind it.
         let [lower, upper] = mesh.bounding_box();
-        let cuts = [0, 1, 2].map(|d| [sources.lower[d] <= lower[d], sources.upper[d] >= upper[d]]);
+        let rounding = ROUNDING * norm(sub(upper, lower));
+        let cuts = [0, 1, 2]
+            .map(|d| [sources.lower[d] <= lower[d] + rounding, sources.upper[d] >= upper[d] - rounding]);
         let whole = |d: usize| {
             let own = sources.upper[d] - sources.lower[d];
-            match cuts[d] {
-                [false, false] => own,
-                [true, true] => 0.0,
-                _ => 2.0 * own,
-            }
+            if cuts[d][0] != cuts[d][1] { 2.0 * own } else { own }
         };
         let source_size_m = 0.5 * norm([0, 1, 2].map(whole));
         let near = if cuts.contains(&[true, true]) { NEAR_IN_A_PLANE } else { NEAR };

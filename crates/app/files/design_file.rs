@@ -55,10 +55,10 @@ pub enum DesignFileError {
     },
     /// A B–H table is not what the run of the design has read.
     #[error(
-        "the B–H table `{}` is another than the one that the run of `{path}` has read; restore it, or analyse the configuration \
+        "the B–H table `{}` is another than the one that the run in `{run}` has read; restore it, or analyse the configuration \
          with --design to take the design to another steel", table.display()
     )]
-    Table { path: PathBuf, table: PathBuf },
+    Table { run: PathBuf, table: PathBuf },
 }
 
 /// Largest distance between two places of a variable, relative to the diagonal of the mesh: far above what writing and
@@ -73,29 +73,28 @@ pub struct DesignFile {
     pub values: Vec<f64>,
     /// Where the variables act [m]; `None` where the file does not say.
     points: Option<Vec<[f64; 3]>>,
-    /// The B–H tables of its run with their hashes; empty where it is taken to another configuration.
-    tables: Vec<FileHash>,
+    /// The folder of the run whose configuration is analysed, and the B–H tables that it has read; `None` without one.
+    run: Option<(PathBuf, Vec<FileHash>)>,
 }
 
 impl DesignFile {
-    /// The same, for the configuration of its run, which has read these B–H tables.
+    /// The same, for the configuration of the run in a folder, which has read these B–H tables.
     #[must_use]
-    pub fn of_run(self, tables: Vec<FileHash>) -> Self {
-        Self { tables, ..self }
+    pub fn of_run(self, folder: PathBuf, tables: Vec<FileHash>) -> Self {
+        Self { run: Some((folder, tables)), ..self }
     }
 
-    /// Whether tables with these hashes of their content are those that its run has read; others have other names.
+    /// Whether tables with these hashes of their content are those that the run has read; others have other names.
     ///
     /// # Errors
     /// [`DesignFileError::Table`].
     pub fn check_tables(&self, read: &BTreeMap<PathBuf, String>) -> Result<(), DesignFileError> {
+        let Some((run, tables)) = &self.run else { return Ok(()) };
         let is_other =
             |own: &&FileHash| read.get(Path::new(&own.path)).is_some_and(|hash| *hash != own.blake3);
-        match self.tables.iter().find(is_other) {
+        match tables.iter().find(is_other) {
             None => Ok(()),
-            Some(own) => {
-                Err(DesignFileError::Table { path: self.path.clone(), table: PathBuf::from(&own.path) })
-            }
+            Some(own) => Err(DesignFileError::Table { run: run.clone(), table: PathBuf::from(&own.path) }),
         }
     }
 
@@ -175,7 +174,7 @@ pub fn read_design(path: &Path, expected: usize) -> Result<DesignFile, DesignFil
             Some(points).filter(|points| points.len() == expected)
         }
     };
-    Ok(DesignFile { path: path.to_owned(), values, points, tables: Vec::new() })
+    Ok(DesignFile { path: path.to_owned(), values, points, run: None })
 }
 
 #[cfg(test)]
@@ -220,7 +219,8 @@ mod tests {
         let read = |name: &str, hash: &str| BTreeMap::from([(PathBuf::from(name), hash.to_owned())]);
         let design = read_design(&path, 1).expect("a design");
         design.check_tables(&read("steel.csv", "b")).expect("one of no run");
-        let design = design.of_run(vec![FileHash { path: "steel.csv".to_owned(), blake3: "a".to_owned() }]);
+        let design = design
+            .of_run("run".into(), vec![FileHash { path: "steel.csv".to_owned(), blake3: "a".to_owned() }]);
         design.check_tables(&read("steel.csv", "a")).expect("its own");
         design.check_tables(&read("other.csv", "b")).expect("another material");
         let error = design.check_tables(&read("steel.csv", "b")).expect_err("changed").to_string();

@@ -1,7 +1,8 @@
 //! How exact the objective of a run or an analysis is: estimated errors, the same shapes by other elements, the verdict.
 //!
 //! A run has second opinions: the ratio on a mesh that the optimiser never saw (`mesh_independence`), the ratio
-//! without the estimated errors, and that of other elements on the same mesh. First-order edge elements are checked by what
+//! without the estimated errors, and that of other elements on the same mesh. What the facets of curved surfaces change (`facets`)
+//! may speak against a gain. First-order edge elements are checked by what
 //! the estimate has of second order, which is no third opinion, second-order ones by the first, nodal ones by edge elements of their order, which are
 //! right where these are not. None of them costs more than a few evaluations; what fails or does not fit is said, and costs
 //! the run nothing else.
@@ -18,8 +19,8 @@ use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
 use crate::files::{
-    Accuracy, CrossCheck, ObjectiveResult, OverwritePolicy, Refinements, SAFETY, StopReason, Verdict,
-    relative_bar,
+    Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, SAFETY, StopReason,
+    Verdict, relative_bar,
 };
 use crate::show::Observer;
 
@@ -105,25 +106,11 @@ impl Session<'_> {
         (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
-        let shape = self.cut_shape(objective, meshes);
         let is_said = errors.is_some()
             || objective.is_verified_on_cut_elements()
             || self.is_geometry_looked_at() && self.is_checked(stop_reason);
-        let facets = is_said.then(|| {
-            let [initial, best] = meshes.solved.each_ref();
-            let is_one_design = initial.points() == best.points();
-            let shapes = [(initial, objective.initial), (best, objective.best)];
-            let is_measured = self.has_field_objective() && self.is_geometry_looked_at();
-            let shapes = match is_measured {
-                false => &[],
-                true if is_one_design => &shapes[..1],
-                true => &shapes[..],
-            };
-            self.facets_of(shape, shapes, observer)
-        });
-        let facets = facets.flatten();
+        let facets = if is_said { self.facets_of_run(objective, meshes, observer) } else { None };
         let near_wall = is_said.then(|| self.near_wall_noted(observer)).flatten();
-        let changes = facets.as_ref().and_then(|facets| facets.change);
         let mut accuracy = Accuracy { facets, near_wall, ..Accuracy::default() };
         if !self.has_field_objective() {
             return Some(accuracy).filter(Accuracy::says_something_of_the_geometry);
@@ -131,16 +118,19 @@ impl Session<'_> {
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);
         }
-        let tolerance = self.config.accuracy.tolerance.zip(errors);
-        accuracy.within_tolerance =
-            tolerance.map(|(tolerance, errors)| is_within(tolerance, (errors, changes), objective, observer));
-        let at_limit = matches!(stop_reason, StopReason::MaxEvaluations | StopReason::MaxTime);
-        let can_refine = |own: &Refinements| own.refinements.len() < self.config.accuracy.max_refinements;
-        if accuracy.within_tolerance == Some(false) && at_limit && refinements.is_some_and(can_refine) {
-            observer.notice(&format!(
-                "{}: a run that is resumed with more looks at its mesh again",
-                stop_reason.describe()
-            ));
+        // Where facets change what is not known, nothing is said of the tolerance.
+        let known = accuracy.facets.as_ref().map_or(Some([0.0; 2]), |facets| facets.change);
+        if let Some(((tolerance, errors), changes)) = self.config.accuracy.tolerance.zip(errors).zip(known) {
+            let kept = kept(tolerance, (errors, changes), objective, observer);
+            accuracy.within_tolerance = Some(kept == Kept::Yes);
+            let at_limit = matches!(stop_reason, StopReason::MaxEvaluations | StopReason::MaxTime);
+            let can_refine = |own: &Refinements| own.refinements.len() < self.config.accuracy.max_refinements;
+            if kept == Kept::ByNoBar && at_limit && refinements.is_some_and(can_refine) {
+                observer.notice(&format!(
+                    "{}: a run that is resumed with more looks at its mesh again",
+                    stop_reason.describe()
+                ));
+            }
         }
         let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
         let analysis = &self.config.analysis;
@@ -166,6 +156,23 @@ impl Session<'_> {
         (accuracy != Accuracy::default()).then_some(accuracy)
     }
 
+    /// What the facets of a run change at its initial and its best shape.
+    fn facets_of_run(
+        &self,
+        objective: &ObjectiveResult,
+        meshes: &ShapeMeshes,
+        observer: &mut dyn Observer,
+    ) -> Option<CurvedFacets> {
+        let [initial, best] = meshes.solved.each_ref();
+        let shapes = [(initial, objective.initial), (best, objective.best)];
+        let shapes = match self.has_field_objective() && self.is_geometry_looked_at() {
+            false => &[],
+            true if initial.points() == best.points() => &shapes[..1],
+            true => &shapes[..],
+        };
+        self.facets_of(self.cut_shape(objective, meshes), shapes, observer)
+    }
+
     /// Judges the gain of a run by the other values that are known of its objective, of which `corrected` are those without the
     /// estimated errors.
     fn judge(
@@ -177,10 +184,12 @@ impl Session<'_> {
     ) {
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.values);
         let verified = objective.verification.as_ref().map(|found| [found.initial, found.best]);
+        let mut others: Vec<[f64; 2]> = [verified, corrected, cross_check].into_iter().flatten().collect();
+        // Of the same mesh and elements: it may speak against a gain, and is none for it.
         let on_surfaces = accuracy.facets.as_ref().and_then(|facets| facets.change);
-        let on_surfaces = on_surfaces.map(|[first, last]| [objective.initial + first, objective.best + last]);
-        let others: Vec<[f64; 2]> =
-            [verified, corrected, cross_check, on_surfaces].into_iter().flatten().collect();
+        if let Some([first, last]) = on_surfaces.filter(|_| !others.is_empty()) {
+            others.push([objective.initial + first, objective.best + last]);
+        }
         // A best design that is none for the objective alone, as where it has to keep a constraint first, has no gain, nor has one
         // that violates a constraint.
         let sign = self.config.objective.as_ref().map_or(1.0, |objective| objective.goal.sign());
@@ -193,8 +202,8 @@ impl Session<'_> {
                 ElementOrder::Quadratic => "refine the mesh",
             };
             observer.warning(&format!(
-                "the gain of this run is not confirmed: less than half of it is left on another mesh, by other elements or \
-                 without the estimated errors; {cure}"
+                "the gain of this run is not confirmed: less than half of it is left on another mesh, by other elements, \
+                 without the estimated errors or with its facets on their surfaces; {cure}, with smaller faces where they are curved"
             ));
         }
         let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error);
@@ -266,36 +275,58 @@ impl Session<'_> {
     }
 }
 
+/// Whether a tolerance is kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Kept {
+    /// By the error bars with what facets change.
+    Yes,
+    /// By the error bars, but not with what facets change, which no refinement takes away.
+    ButForFacets,
+    /// An error bar is beyond it.
+    ByNoBar,
+}
+
 /// Whether the error bars of both designs, with what facets change, are within a tolerance; which are not is reported.
-fn is_within(
+fn kept(
     tolerance: f64,
-    (errors, changes): ([f64; 2], Option<[f64; 2]>),
+    (errors, changes): ([f64; 2], [f64; 2]),
     objective: &ObjectiveResult,
     observer: &mut dyn Observer,
-) -> bool {
+) -> Kept {
     let larger = objective.initial.abs().max(objective.best.abs());
     let designs = [("initial", objective.initial), ("best", larger)];
-    let changes = changes.unwrap_or_default();
-    let mut beyond = Vec::new();
-    for (k, (design, scale)) in designs.into_iter().enumerate() {
-        let bar = relative_bar(errors[k], scale).unwrap_or(f64::INFINITY);
-        let facets = (changes[k] / scale).abs();
-        if bar + facets > tolerance {
-            let of_facets = match facets {
-                0.0 => String::new(),
-                _ => format!(" and {:.3} % of the facets", 100.0 * facets),
-            };
-            beyond.push(format!("{:.3} %{of_facets} for the {design} design", 100.0 * bar));
+    let (mut kept, mut beyond) = (Kept::Yes, Vec::new());
+    for ((design, scale), (error, change)) in designs.into_iter().zip(errors.into_iter().zip(changes)) {
+        let bar = relative_bar(error, scale).unwrap_or(f64::INFINITY);
+        let facets = (change / scale).abs();
+        if bar + facets <= tolerance {
+            continue;
         }
+        if bar > tolerance {
+            kept = Kept::ByNoBar;
+        } else if kept == Kept::Yes {
+            kept = Kept::ButForFacets;
+        }
+        let of_facets = match change {
+            0.0 => String::new(),
+            _ => format!(" and the change of facets {:.3} %", 100.0 * facets),
+        };
+        beyond.push(format!("{:.3} %{of_facets} for the {design} design", 100.0 * bar));
     }
     if !beyond.is_empty() {
+        let cure = match kept {
+            Kept::ButForFacets => {
+                "; no refinement takes the facets away, but a mesh with smaller faces there"
+            }
+            _ => "",
+        };
         observer.notice(&format!(
-            "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}",
+            "accuracy.tolerance is {:.3} %, and on the last mesh the error bar is {}{cure}",
             100.0 * tolerance,
             beyond.join(", ")
         ));
     }
-    beyond.is_empty()
+    kept
 }
 
 /// What other elements say of a gain.

@@ -12,7 +12,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::problem::SolverCache;
 
 use super::Session;
-use super::finer::{Cut, FinerProblem, looked_at_once};
+use super::finer::{Cut, FinerProblem};
 use crate::build::{functionals, is_air, is_open, is_wound, memory_limit, remaining_nodes};
 use crate::config::Config;
 use crate::error::Error;
@@ -24,7 +24,10 @@ use crate::show::Observer;
 const KEPT_VOLUME: f64 = 0.5;
 
 /// The least part of the way: less would be noise of the linear solver.
-const LEAST_PART: f64 = 1.0 / 64.0;
+const LEAST_PART: f64 = 1.0 / 8.0;
+
+/// Why a change is not known after a signal.
+const CUT_SHORT: &str = "it was stopped before";
 
 /// The facets of a mesh with all its regions, as it was read or generated.
 #[derive(Debug)]
@@ -73,25 +76,47 @@ fn farthest(config: &Config, mesh: &Mesh) -> Option<CurvedFacets> {
     })
 }
 
-/// Which surfaces count, by the regions on both sides: none between two regions that are empty, where nothing changes, nor the end
-/// of open space, whose shell maps its own shape.
+/// Which surfaces count, by the regions on both sides: not where both are alike to the field or replaced by their surfaces, nor the
+/// end of open space, whose shell maps its own shape, nor the outside of a region that is replaced.
 fn counted(config: &Config, topology: &Topology) -> impl Fn(RegionId, Option<RegionId>) -> bool {
-    let of = |is: &dyn Fn(&str) -> bool| -> Vec<bool> {
-        topology.region_names().iter().map(|name| is(name)).collect()
-    };
-    let (empty, open) = (of(&|name| is_empty(config, name)), of(&|name| is_open(config, name)));
-    move |own, other| match other {
-        Some(other) => !(empty[own.index()] && empty[other.index()]),
-        None => !open[own.index()],
+    let names = topology.region_names();
+    let of = |is: &dyn Fn(&str) -> bool| -> Vec<bool> { names.iter().map(|name| is(name)).collect() };
+    let is_replaced = |name: &str| !config.is_meshed(name);
+    let is_hidden = of(&|name| is_replaced(name) || is_open(config, name));
+    let (empty, replaced) = (of(&|name| is_empty(config, name)), of(&is_replaced));
+    // The first region with the same settings, in which nothing is observed or wound.
+    let settings = |name: &String| config.regions.get(name);
+    let is_plain = of(&|name| !is_wound(config, name) && !is_observed(config, name));
+    let alike: Vec<usize> = (0..names.len())
+        .map(|k| {
+            let same = |&j: &usize| is_plain[j] && is_plain[k] && settings(&names[j]) == settings(&names[k]);
+            (0..k).find(same).unwrap_or(k)
+        })
+        .collect();
+    move |own, other| {
+        let own = own.index();
+        let Some(other) = other.map(RegionId::index) else { return !is_hidden[own] };
+        !(empty[own] && empty[other] || replaced[own] && replaced[other] || alike[own] == alike[other])
     }
 }
 
 /// Whether a region is air in which nothing flows and nothing is measured.
 fn is_empty(config: &Config, name: &str) -> bool {
-    is_air(config, name)
-        && !is_wound(config, name)
-        && !config.forces.iter().any(|body| body.regions.iter().any(|own| own == name))
-        && !functionals(config).iter().any(|(_, own)| own.region.as_deref() == Some(name))
+    is_air(config, name) && !is_wound(config, name) && !is_observed(config, name)
+}
+
+/// Whether a force or a functional is of a region.
+fn is_observed(config: &Config, name: &str) -> bool {
+    config.forces.iter().any(|body| body.regions.iter().any(|own| own == name))
+        || functionals(config).iter().any(|(_, own)| own.region.as_deref() == Some(name))
+}
+
+/// The nodes of the design surface on a mesh with all its regions, where they are the variables: their facets are the design. With a
+/// control grid, which has a shape between the nodes, none.
+fn designed_nodes(config: &Config, topology: &Topology) -> Vec<NodeId> {
+    let design = config.design.iter().filter(|design| design.grid.is_none());
+    let surfaces = design.flat_map(|design| &design.surface).filter_map(|name| topology.surface(name).ok());
+    surfaces.flatten().flatten().copied().collect()
 }
 
 /// What no refinement takes away, in words; of these objectives of one design or of two.
@@ -118,7 +143,7 @@ fn described(found: &CurvedFacets, objectives: &[f64]) -> String {
         _ => {
             return format!(
                 "{head}: no error bar counts that, and refined meshes and cut elements keep the facets; begin with smaller faces there \
-             to see what it does"
+                 to see what it does"
             );
         }
     };
@@ -142,40 +167,51 @@ impl Session<'_> {
         let mut found = if off(&of_shape) > off(&own) { of_shape } else { own }?;
         if !shapes.is_empty() {
             observer.phase("measuring what the facets of curved surfaces change");
-            found.change = match self.changes(shapes) {
-                Ok(changes) => changes.map(|changes| [changes[0], changes[shapes.len() - 1]]),
-                Err(error) => {
-                    observer
-                        .notice(&format!("what the facets of curved surfaces change is not known: {error}"));
+            let why = match self.changes(shapes) {
+                Ok(Ok(changes)) => {
+                    found.change = Some([changes[0], changes[shapes.len() - 1]]);
                     None
                 }
+                Ok(Err(reason)) => Some(reason.to_owned()),
+                Err(error) => Some(error.to_string()),
             };
+            if let Some(why) = why {
+                observer.notice(&format!("what the facets of curved surfaces change is not known: {why}"));
+            }
         }
         let objectives: Vec<f64> = shapes.iter().map(|(_, objective)| *objective).collect();
         observer.notice(&described(&found, &objectives));
         Some(found)
     }
 
-    /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about.
-    /// `None` where elements are too thin for that, or a signal comes first.
-    fn changes(&self, shapes: &[(&Mesh, f64)]) -> Result<Option<Vec<f64>>, Error> {
+    /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about;
+    /// or why that is not known.
+    fn changes(&self, shapes: &[(&Mesh, f64)]) -> Result<Result<Vec<f64>, &'static str>, Error> {
+        if (self.interrupted)() {
+            return Ok(Err(CUT_SHORT));
+        }
         let (config, full, first) = (self.config, &self.setup.full_mesh, &self.facets);
         let remaining = remaining_nodes(config, full.topology());
+        let designed = designed_nodes(config, full.topology());
+        let of_full = first.onto_surfaces(config, full.points());
         let of_shape = |shape: &Mesh| -> Vec<Point> {
             let mut points = full.points().to_vec();
             remaining.iter().zip(shape.points()).for_each(|(node, point)| points[node.index()] = *point);
-            let motion = first.onto_surfaces(config, &points);
+            let mut motion = first.onto_surfaces(config, &points);
+            designed.iter().for_each(|node| motion[node.index()] = of_full[node.index()]);
             remaining.iter().map(|node| motion[node.index()]).collect()
         };
-        let of_full = first.onto_surfaces(config, full.points());
         let of_shapes: Vec<Vec<Point>> = shapes.iter().map(|(shape, _)| of_shape(shape)).collect();
         let motions = shapes.iter().zip(&of_shapes).map(|((shape, _), motion)| (*shape, motion));
-        let Some(part) = part_of_the_way(motions.chain([(full, &of_full)])) else { return Ok(None) };
+        let Some(part) = part_of_the_way(motions.chain([(full, &of_full)])) else {
+            return Ok(Err("elements beside them are too thin to follow"));
+        };
         let moved = |mesh: &Mesh, motion: &[Point]| {
             let motion: Vec<Point> = motion.iter().map(|m| m.map(|c| part * c)).collect();
             mesh.moved(&motion).map_err(OptimizerError::from)
         };
-        let config = looked_at_once(Config { constraints: Vec::new(), ..config.clone() });
+        // Solved as the run was: what is left of its residual is in the objective, and cancels.
+        let config = Config { constraints: Vec::new(), ..config.clone() };
         let problem = FinerProblem::new(&config, self.source, &moved(full, &of_full)?, Cut::Halvings(0))?;
         memory_limit::check_problem(&problem.setup.problem, self.source, OverwritePolicy::Keep)?;
         let (cache, mut changes) = (&mut SolverCache::default(), Vec::new());
@@ -185,12 +221,12 @@ impl Session<'_> {
                 continue;
             }
             if (self.interrupted)() {
-                return Ok(None);
+                return Ok(Err(CUT_SHORT));
             }
             let found = problem.analyse(&moved(shape, motion)?, cache)?.objective.unwrap_or(f64::NAN);
             changes.push((found - objective) / part);
         }
-        Ok(Some(changes))
+        Ok(if changes.iter().all(|change| change.is_finite()) { Ok(changes) } else { Err("it is no number") })
     }
 }
 

@@ -52,8 +52,8 @@ use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{
-    Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements, RunDirectory,
-    RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
+    CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements,
+    RunDirectory, RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
@@ -371,6 +371,11 @@ impl Session<'_> {
             }
             result.accuracy =
                 self.accuracy((objective, stop_reason, keeps_all), meshes, (errors, refinements), observer);
+            let is_measured = |own: &CurvedFacets| own.change.is_some();
+            let facets = result.accuracy.as_ref().and_then(|accuracy| accuracy.facets.as_ref());
+            if self.is_checked(stop_reason) && !facets.is_none_or(is_measured) && (self.interrupted)() {
+                result.status = RunStatus::Interrupted;
+            }
         }
         let seconds = clock.elapsed().as_secs_f64();
         result.timings_s.insert("verification".to_owned(), seconds);

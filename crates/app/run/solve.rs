@@ -29,6 +29,8 @@ pub fn solve(
     let problem = &mut prepared.setup.problem;
     if let (Some(shape), Some(design)) = (problem.shape(), &design) {
         design.check_places(shape.surface(), problem.original().bounding_box())?;
+    }
+    if let Some(design) = &design {
         design.check_tables(&prepared.setup.tables)?;
     }
     let values = design_values(problem, design.map(|design| design.values), observer);

@@ -1,28 +1,35 @@
 //! Curved surfaces that a mesh has as facets: how far these are off them, and where they would lie on them in the mean.
 //!
-//! A surface is taken from its facets alone: with the mean normals `n` of the smooth surface at the ends of an edge `e`, its
-//! middle lies `s = (n_b − n_a)·e/8` over the edge, exactly so of a circle (`L²/(8R)`). Over a triangle with its nodes on the
-//! surface this is a quadratic function, whose mean is a third of the sum over its edges. Facets between the same regions are one
-//! smooth surface where they meet at less than [`SMOOTH`]; edges flatter than [`FLAT`] lie in a plane.
+//! A surface is taken from its facets alone: with its normals `n` at the ends of an edge `e`, its middle lies `s = (n_b − n_a)·e/8`
+//! over the edge, exactly so of a circle (`L²/(8R)`). Over a triangle with its nodes on the surface this is a quadratic function,
+//! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around; where these are on one side
+//! only, as at a plane of symmetry, it goes on as from the faces behind to them.
+//!
+//! Facets go on in each other where they meet at less than [`SMOOTH`], whatever the regions behind them, and where one of them has
+//! turns at all of its nodes: an edge between two planes with nodes of their own is an edge.
 //!
 //! Does not live here: which surfaces matter, and what their facets do to a field.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ids::{NodeId, RegionId};
-use crate::tet4::{Point, area_vector, cross, dot, norm, sub};
+use crate::tet4::{Point, add, area_vector, centroid, cross, dot, norm, sub};
 use crate::topology::{Facet, Topology};
 
-/// Cosine of the largest angle, 35°, at which two facets are taken for one curved surface: a ball with eight of them along a half
-/// circle, and no chamfer of 45°.
-const SMOOTH: f64 = 0.82;
+/// Cosine of the largest angle, 42°, at which two facets are taken for one curved surface: a ball with nine of them along a circle,
+/// and no chamfer of 45°.
+const SMOOTH: f64 = 0.743;
 
-/// Share of an edge's length below which its middle is taken to lie on the surface: planes of a mesh file with few digits.
+/// Sine of the angle below which two faces are one plane, and share of an edge's length below which its middle is taken to lie on the
+/// surface: mesh files with few digits.
 const FLAT: f64 = 1e-5;
 
 /// What a condition on the motion of a node counts at least, of a condition whose normal no other one shares. Normals of one surface
-/// that differ by the rounding of a file are one condition, and edges of 35° and more are kept to a few hundredths of the motion.
+/// that differ by the rounding of a file are one condition, and edges of 42° and more are kept to a few hundredths of the motion.
 const SHARED: f64 = 0.01;
+
+/// The same of the directions in which normals at a rim change, relative to the area of the facets: rounding is no slope.
+const EXTENT: f64 = 1e-4;
 
 /// Surfaces of a mesh, curved and flat ones.
 #[derive(Debug)]
@@ -38,9 +45,13 @@ pub struct CurvedSurfaces<'a> {
 struct Face {
     nodes: [NodeId; 3],
     between: (RegionId, Option<RegionId>),
-    /// Out of the region with the lower number.
     area: Point,
+    /// The face that it goes on in, behind the edge from each node to the next one.
+    next: [Option<usize>; 3],
 }
+
+/// A face of a surface, with the direction of another face of it: 1, or −1 where it is the other one.
+type Directed = (usize, f64);
 
 /// The edge of a surface that is farthest off it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,35 +75,71 @@ impl<'a> CurvedSurfaces<'a> {
         let of = |facet: &Facet| {
             let nodes = facet.nodes;
             let area = area_vector(nodes.map(|n| points[n.index()]));
-            let (between, area) = match (region(facet.inside), facet.outside.map(region)) {
-                // One direction for both orders of the regions.
-                (own, Some(other)) if own > other => ((other, Some(own)), area.map(|c| -c)),
-                between => (between, area),
+            let between = match (region(facet.inside), facet.outside.map(region)) {
+                (own, Some(other)) if own > other => (other, Some(own)),
+                between => between,
             };
-            (Some(between.0) != between.1 && counts(between.0, between.1)).then_some(Face {
-                nodes,
-                between,
-                area,
-            })
+            let is_face = Some(between.0) != between.1 && counts(between.0, between.1) && norm(area) > 0.0;
+            is_face.then_some(Face { nodes, between, area, next: [None; 3] })
         };
         let faces: Vec<Face> = topology.facets().iter().filter_map(of).collect();
         let mut around: BTreeMap<NodeId, Vec<usize>> = BTreeMap::new();
         for (i, face) in faces.iter().enumerate() {
             face.nodes.iter().for_each(|&n| around.entry(n).or_default().push(i));
         }
-        Self { points, faces, around }
+        let mut surfaces = Self { points, faces, around };
+        surfaces.join();
+        surfaces
+    }
+
+    /// Joins faces that go on in each other.
+    fn join(&mut self) {
+        let mut at_edge: BTreeMap<[NodeId; 2], Vec<(usize, usize)>> = BTreeMap::new();
+        for (i, face) in self.faces.iter().enumerate() {
+            for k in 0..3 {
+                let mut ends = face.edge(k);
+                ends.sort_unstable();
+                at_edge.entry(ends).or_default().push((i, k));
+            }
+        }
+        let mut joints = Vec::new();
+        for (ends, sides) in &at_edge {
+            let pairs =
+                sides.iter().enumerate().flat_map(|(n, a)| sides[n + 1..].iter().map(move |b| (*a, *b)));
+            let straightness = |&(a, b): &((usize, usize), (usize, usize))| {
+                -dot(self.into_face(a.0, *ends), self.into_face(b.0, *ends))
+            };
+            let best = pairs.max_by(|a, b| straightness(a).total_cmp(&straightness(b)));
+            joints.extend(best.filter(|pair| straightness(pair) > SMOOTH).map(|pair| (*ends, pair)));
+        }
+        let turns = |((i, _), (j, _)): ((usize, usize), (usize, usize))| self.turns(i, j);
+        let turning: BTreeSet<NodeId> =
+            joints.iter().filter(|(_, pair)| turns(*pair)).flat_map(|(ends, _)| *ends).collect();
+        let is_curved = |i: usize| self.faces[i].nodes.iter().all(|n| turning.contains(n));
+        joints.retain(|(_, pair)| !turns(*pair) || is_curved(pair.0.0) || is_curved(pair.1.0));
+        for (_, ((i, k), (j, l))) in joints {
+            (self.faces[i].next[k], self.faces[j].next[l]) = (Some(j), Some(i));
+        }
+    }
+
+    /// The direction from an edge into a face, at right angles to the edge.
+    fn into_face(&self, face: usize, [a, b]: [NodeId; 2]) -> Point {
+        let other = self.faces[face].nodes.into_iter().find(|n| *n != a && *n != b).unwrap_or(a);
+        let [a, b, other] = [a, b, other].map(|n| self.points[n.index()]);
+        let along = unit(sub(b, a));
+        unit(project_out(&[along], sub(other, a)))
     }
 
     /// The edge that is farthest off the surface that its facets stand for, at the outside only where nothing inside is curved;
     /// `None` where nothing is.
     pub fn farthest(&self) -> Option<Farthest> {
         let mut worst: Option<((bool, f64), Farthest)> = None;
-        for face in &self.faces {
-            for (ends, height) in self.heights(face) {
+        for (i, face) in self.faces.iter().enumerate() {
+            for (k, height) in self.heights(i).into_iter().enumerate() {
                 let (off, between) = (height.abs(), face.between);
                 let rank = (between.1.is_some(), off);
                 if off > 0.0 && worst.is_none_or(|(most, _)| rank > most) {
-                    worst = Some((rank, Farthest { between, ends, off }));
+                    worst = Some((rank, Farthest { between, ends: face.edge(k), off }));
                 }
             }
         }
@@ -102,114 +149,197 @@ impl<'a> CurvedSurfaces<'a> {
     /// The motion of every node [m] after which facets lie on their surfaces in the mean, so that bodies have the volume that these
     /// enclose: along the normals of curved surfaces, along flat ones, and within planes at the outside.
     pub fn onto_surfaces(&self) -> Vec<Point> {
-        let mean = |face: &Face| self.heights(face).iter().map(|(_, height)| height / 3.0).sum::<f64>();
-        let means: Vec<f64> = self.faces.iter().map(mean).collect();
+        let mean = |face: usize| self.heights(face).iter().map(|height| height / 3.0).sum::<f64>();
+        let means: Vec<f64> = (0..self.faces.len()).map(mean).collect();
         let mut motion = vec![[0.0; 3]; self.points.len()];
-        for (node, own) in &self.around {
-            motion[node.index()] = self.motion_of_node(own, &means);
+        for (&node, own) in &self.around {
+            if own.iter().any(|&i| means[i] != 0.0) {
+                motion[node.index()] = self.motion_of(node, own, &means);
+            }
         }
         motion
     }
 
     /// The shortest motion [m] of a node with these faces that has the mean height of each of its smooth surfaces along its normal.
-    fn motion_of_node(&self, own: &[usize], means: &[f64]) -> Point {
-        if own.iter().all(|&i| means[i] == 0.0) {
-            return [0.0; 3];
-        }
+    fn motion_of(&self, node: NodeId, own: &[usize], means: &[f64]) -> Point {
         let mut left: Vec<usize> = own.to_vec();
         let mut conditions: Vec<(Point, f64)> = Vec::new();
         let mut planes: Vec<Point> = Vec::new();
         while let Some(&first) = left.first() {
-            let (surface, others) = left.iter().partition(|&&i| self.faces[first].continues(&self.faces[i]));
-            left = others;
-            let surface: Vec<usize> = surface;
-            let weighted = surface.iter().map(|&i| (norm(self.faces[i].area), means[i]));
-            let (area, volume) = weighted.fold((0.0, 0.0), |(a, v), (own, mean)| (a + own, v + own * mean));
-            let sum = sum(surface.iter().map(|&i| self.faces[i].area));
-            let normal = sum.map(|c| c / norm(sum));
-            let is_plane = surface.iter().all(|&i| means[i] == 0.0) && self.faces[first].between.1.is_none();
-            if is_plane {
-                let rest = within(&planes, normal);
+            let surface = self.surface_at(node, first);
+            left.retain(|i| surface.iter().all(|(other, _)| other != i));
+            let (mut area, mut volume, mut total) = ([0.0; 3], 0.0, 0.0);
+            for &(i, direction) in &surface {
+                let own = self.faces[i].area;
+                area = std::array::from_fn(|d| area[d] + direction * own[d]);
+                volume += direction * norm(own) * means[i];
+                total += norm(own);
+            }
+            let is_at_the_outside = surface.iter().all(|(i, _)| self.faces[*i].between.1.is_none());
+            if is_at_the_outside && surface.iter().all(|(i, _)| means[*i] == 0.0) {
+                let rest = project_out(&planes, unit(area));
                 if norm(rest) > SHARED {
-                    planes.push(rest.map(|c| c / norm(rest)));
+                    planes.push(unit(rest));
                 }
             }
-            conditions.push((normal, volume / area));
+            conditions.push((unit(area), volume / total));
         }
         let (mut matrix, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
         for (normal, height) in conditions {
-            let normal = within(&planes, normal);
+            let normal = project_out(&planes, normal);
             for d in 0..3 {
                 right[d] += height * normal[d];
                 (0..3).for_each(|k| matrix[d][k] += normal[d] * normal[k]);
             }
         }
         (0..3).for_each(|d| matrix[d][d] += SHARED);
-        within(&planes, solved(matrix, right))
+        project_out(&planes, solve_symmetric(matrix, right))
     }
 
-    /// The edges of a face with the heights [m] of the surface over their middles, in the direction of its area.
-    fn heights(&self, face: &Face) -> [([NodeId; 2], f64); 3] {
-        let [a, b, c] = face.nodes;
-        [[a, b], [b, c], [c, a]].map(|ends| {
-            let [from, to] = ends.map(|n| self.points[n.index()]);
-            let along = sub(to, from);
-            let turn = match ends.map(|n| self.is_inner(n, face)) {
-                // At a rim there are faces on one side only, such as at a plane of symmetry.
-                [false, true] => sub(self.normal(ends[1], face), self.normal_of_edge(ends, face)),
-                [true, false] => sub(self.normal_of_edge(ends, face), self.normal(ends[0], face)),
-                _ => sub(self.normal(ends[1], face), self.normal(ends[0], face)).map(|c| 0.5 * c),
-            };
-            let height = dot(turn, along) / 4.0;
-            (ends, if height.abs() > FLAT * norm(along) { height } else { 0.0 })
+    /// Heights [m] of the surface over the middles of a face's edges, in the direction of its area.
+    fn heights(&self, face: usize) -> [f64; 3] {
+        let nodes = self.faces[face].nodes;
+        if self.faces[face].next == [None; 3] {
+            return [0.0; 3];
+        }
+        let normals = nodes.map(|node| self.normal(node, face));
+        std::array::from_fn(|k| {
+            let l = (k + 1) % 3;
+            let along = sub(self.points[nodes[l].index()], self.points[nodes[k].index()]);
+            let height = dot(sub(normals[l], normals[k]), along) / 8.0;
+            if height.abs() > FLAT * norm(along) { height } else { 0.0 }
         })
     }
 
-    /// The faces at a node that continue a face.
-    fn surface_at(&self, node: NodeId, face: &Face) -> impl Iterator<Item = &Face> {
-        self.around[&node].iter().map(|&i| &self.faces[i]).filter(|other| face.continues(other))
+    /// The faces at a node that a face goes on in around it, itself the first.
+    fn surface_at(&self, node: NodeId, face: usize) -> Vec<Directed> {
+        let mut found = vec![(face, 1.0)];
+        let mut done = 0;
+        while let Some(&(i, direction)) = found.get(done) {
+            for k in (0..3).filter(|&k| self.faces[i].edge(k).contains(&node)) {
+                self.go_on((i, direction), k, &mut found);
+            }
+            done += 1;
+        }
+        found
     }
 
-    /// Whether the faces that continue a face surround its node.
-    fn is_inner(&self, node: NodeId, face: &Face) -> bool {
-        let mut ends: Vec<NodeId> = self
-            .surface_at(node, face)
-            .flat_map(|other| other.nodes)
-            .filter(|&other| other != node)
-            .collect();
-        ends.sort_unstable();
-        ends.chunks(2).all(|pair| matches!(pair, [a, b] if a == b))
+    /// Adds the face behind an edge, if there is one that is not there yet.
+    fn go_on(&self, (from, direction): Directed, k: usize, found: &mut Vec<Directed>) {
+        if let Some(next) = self.faces[from].next[k].filter(|next| found.iter().all(|(own, _)| own != next)) {
+            let is_same = dot(self.faces[from].area, self.faces[next].area) > 0.0;
+            found.push((next, if is_same { direction } else { -direction }));
+        }
     }
 
-    /// Normal of the surface at a node.
-    fn normal(&self, node: NodeId, face: &Face) -> Point {
-        let sum = sum(self.surface_at(node, face).map(|other| other.area));
-        sum.map(|c| c / norm(sum))
+    /// Normal of a face's surface at a node.
+    fn normal(&self, node: NodeId, face: usize) -> Point {
+        let mut surface = self.surface_at(node, face);
+        let is_closed = |&(i, _): &Directed| {
+            (0..3).all(|k| self.faces[i].next[k].is_some() || !self.faces[i].edge(k).contains(&node))
+        };
+        let is_rim = !surface.iter().all(is_closed);
+        if !is_rim {
+            return unit(sum(surface.iter().map(|own| self.area_of(*own))));
+        }
+        for own in surface.clone() {
+            (0..3).for_each(|k| self.go_on(own, k, &mut surface));
+        }
+        Self::at_rim(self.points[node.index()], self.facets_of(surface))
     }
 
-    /// Mean normal of the surface at both sides of an edge.
-    fn normal_of_edge(&self, [a, b]: [NodeId; 2], face: &Face) -> Point {
-        let sum =
-            sum(self.surface_at(a, face).filter(|other| other.nodes.contains(&b)).map(|other| other.area));
-        sum.map(|c| c / norm(sum))
+    /// The normal of a surface at a rim of it [m], from facets behind, as a linear function of the place.
+    fn at_rim(rim: Point, facets: Vec<RimFacet>) -> Point {
+        let total: f64 = facets.iter().map(|own| own.area).sum();
+        let mean = |part: fn(&RimFacet) -> Point| -> Point {
+            std::array::from_fn(|d| facets.iter().map(|own| own.area * part(own)[d]).sum::<f64>() / total)
+        };
+        let (place, normal) = (mean(|own| own.middle), mean(|own| own.normal));
+        let (mut moments, mut right) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        for own in facets {
+            let (x, n) = (sub(own.middle, place), sub(own.normal, normal));
+            for d in 0..3 {
+                (0..3).for_each(|k| moments[d][k] += own.area * x[d] * x[k]);
+                (0..3).for_each(|k| right[k][d] += own.area * n[k] * x[d]);
+            }
+        }
+        let extent = EXTENT * total * total;
+        (0..3).for_each(|d| moments[d][d] += extent);
+        let away = sub(rim, place);
+        unit(std::array::from_fn(|k| normal[k] + dot(solve_symmetric(moments, right[k]), away)))
+    }
+
+    /// The facets of which some faces are parts: faces in one plane, with what goes on in that plane beside them, are one, whose
+    /// normal is that of the surface over its middle.
+    fn facets_of(&self, mut faces: Vec<Directed>) -> Vec<RimFacet> {
+        for _ in 0..2 {
+            for own in faces.clone() {
+                for k in 0..3 {
+                    let next = self.faces[own.0].next[k];
+                    if next.is_some_and(|next| !self.turns(own.0, next)) {
+                        self.go_on(own, k, &mut faces);
+                    }
+                }
+            }
+        }
+        let mut facets: Vec<(usize, RimFacet)> = Vec::new();
+        for own in faces {
+            let (i, vector) = (own.0, self.area_of(own));
+            let area = norm(vector);
+            let middle = centroid(self.faces[i].nodes.map(|n| self.points[n.index()]));
+            match facets.iter_mut().find(|(first, _)| !self.turns(*first, i)) {
+                Some((_, facet)) => {
+                    let share = area / (facet.area + area);
+                    facet.area += area;
+                    facet.middle =
+                        std::array::from_fn(|d| facet.middle[d] + share * (middle[d] - facet.middle[d]));
+                }
+                None => facets.push((i, RimFacet { area, middle, normal: unit(vector) })),
+            }
+        }
+        facets.into_iter().map(|(_, facet)| facet).collect()
+    }
+
+    /// Whether two faces are not in one plane.
+    fn turns(&self, i: usize, j: usize) -> bool {
+        let [a, b] = [i, j].map(|face| self.faces[face].area);
+        norm(cross(a, b)) > FLAT * norm(a) * norm(b)
+    }
+
+    /// Area vector of a face.
+    fn area_of(&self, (face, direction): Directed) -> Point {
+        self.faces[face].area.map(|c| direction * c)
     }
 }
 
+/// A facet near a rim.
+struct RimFacet {
+    /// [m²]
+    area: f64,
+    /// [m]
+    middle: Point,
+    normal: Point,
+}
+
 impl Face {
-    /// Whether two faces belong to one smooth surface.
-    fn continues(&self, other: &Self) -> bool {
-        self.between == other.between
-            && dot(self.area, other.area) > SMOOTH * norm(self.area) * norm(other.area)
+    /// The edge from a node to the next one.
+    fn edge(&self, k: usize) -> [NodeId; 2] {
+        [self.nodes[k], self.nodes[(k + 1) % 3]]
     }
 }
 
 /// The sum of vectors.
 fn sum(vectors: impl Iterator<Item = Point>) -> Point {
-    vectors.fold([0.0; 3], |sum, v| std::array::from_fn(|d| sum[d] + v[d]))
+    vectors.fold([0.0; 3], add)
+}
+
+/// A vector of length 1 in this direction.
+fn unit(vector: Point) -> Point {
+    vector.map(|c| c / norm(vector))
 }
 
 /// What of a vector is perpendicular to all of some normals, which are so to each other.
-fn within(normals: &[Point], vector: Point) -> Point {
+fn project_out(normals: &[Point], vector: Point) -> Point {
     normals.iter().fold(vector, |v, n| {
         let along = dot(v, *n);
         std::array::from_fn(|d| v[d] - along * n[d])
@@ -217,7 +347,7 @@ fn within(normals: &[Point], vector: Point) -> Point {
 }
 
 /// The solution of a symmetric, positive definite system.
-fn solved([a, b, c]: [Point; 3], right: Point) -> Point {
+fn solve_symmetric([a, b, c]: [Point; 3], right: Point) -> Point {
     let determinant = dot(a, cross(b, c));
     [cross(b, c), cross(c, a), cross(a, b)].map(|row| dot(row, right) / determinant)
 }
@@ -284,5 +414,29 @@ mod tests {
                 assert!((0..3).all(|d| point[d] > 1e-9 || motion[d].abs() < 1e-15), "{point:?} {motion:?}");
             }
         }
+    }
+
+    /// A block whose top is bent along a line into two planes of several cells, and one whose top is an arc of as many chords.
+    #[test]
+    fn an_edge_between_planes_is_none_of_a_curved_surface() {
+        let bent = |height: &dyn Fn(f64) -> f64| {
+            let flat = block(&BlockParameters { size: [0.1; 3], cells: [6; 3] }).expect("a block");
+            let [lower, upper] = flat.bounding_box();
+            let lift = |x: &Point| {
+                let share = (x[0] - lower[0]) / (upper[0] - lower[0]);
+                [0.0, 0.0, height(share) * (x[2] - lower[2]) / (upper[2] - lower[2])]
+            };
+            let lifts: Vec<Point> = flat.points().iter().map(lift).collect();
+            flat.moved(&lifts).expect("a sound mesh")
+        };
+        for slope in [0.1, 0.3, 0.6] {
+            let roof = bent(&|share| -slope * 0.1 * (share - 0.5).abs());
+            assert_eq!(surfaces(&roof).farthest(), None, "{slope}");
+        }
+        let arc = bent(&|share| -0.1 * (share - 0.5).powi(2));
+        let found = surfaces(&arc).farthest().expect("it is curved");
+        // A sixth of a parabola, under a slope of a third at the sides and none in the middle.
+        let height = 0.1 / (6.0f64 * 2.0).powi(2);
+        assert!((found.off / height - 1.0).abs() < 0.15, "{} {height}", found.off);
     }
 }

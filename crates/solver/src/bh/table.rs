@@ -96,6 +96,9 @@ const LARGEST_POLARISATION: f64 = 10.0;
 /// Share of the largest polarisation below which a table's falls: the digits of measured ones leave less.
 const FALLING: f64 = 0.99;
 
+/// Polarisation [T] of which nothing is said: that of a vacuum with its digits.
+const LEAST_POLARISATION: f64 = 0.01;
+
 impl Table {
     /// From points `[H, B]` [A/m, T]; the origin may be among them.
     ///
@@ -186,7 +189,7 @@ impl Table {
         let found = points.find(|&(h, b)| {
             let polarisation = b - VACUUM_PERMEABILITY * h;
             most = f64::max(most, polarisation);
-            polarisation < FALLING * most
+            most > LEAST_POLARISATION && polarisation < FALLING * most
         });
         found.map(|(&h, &b)| [h, b])
     }

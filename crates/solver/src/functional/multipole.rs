@@ -416,6 +416,9 @@ impl MultipoleFunctional {
             OfTerms::Content { terms, main } => {
                 let reference = square(main, coefficients);
                 let content = content(terms, coefficients, reference);
+                if content == 0.0 {
+                    return (0.0, vec![zero; coefficients.len()]);
+                }
                 let slope = |(term, c): &(Harmonic, c64)| {
                     let own = if terms.contains(term) { 1.0 } else { 0.0 };
                     let compared = if main.contains(term) { content } else { 0.0 };
