@@ -107,7 +107,7 @@ impl<'a> CurvedSurfaces<'a> {
             let pairs =
                 sides.iter().enumerate().flat_map(|(n, a)| sides[n + 1..].iter().map(move |b| (*a, *b)));
             let straightness = |&(a, b): &((usize, usize), (usize, usize))| {
-                -dot(self.into_face(a.0, *ends), self.into_face(b.0, *ends))
+                -dot(self.across_edge(a.0, *ends), self.across_edge(b.0, *ends))
             };
             let best = pairs.max_by(|a, b| straightness(a).total_cmp(&straightness(b)));
             joints.extend(best.filter(|pair| straightness(pair) > SMOOTH).map(|pair| (*ends, pair)));
@@ -123,7 +123,7 @@ impl<'a> CurvedSurfaces<'a> {
     }
 
     /// The direction from an edge into a face, at right angles to the edge.
-    fn into_face(&self, face: usize, [a, b]: [NodeId; 2]) -> Point {
+    fn across_edge(&self, face: usize, [a, b]: [NodeId; 2]) -> Point {
         let other = self.faces[face].nodes.into_iter().find(|n| *n != a && *n != b).unwrap_or(a);
         let [a, b, other] = [a, b, other].map(|n| self.points[n.index()]);
         let along = unit(sub(b, a));
