@@ -5,7 +5,7 @@
 //! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around; where these are on one side
 //! only, as at a plane of symmetry, it goes on as from the faces behind to them.
 //!
-//! Facets go on in each other where they meet at less than [`SMOOTH`], whatever the regions behind them, and where one of them has
+//! Facets go on in each other where they meet at less than 42°, whatever the regions behind them, and where one of them has
 //! turns at all of its nodes: an edge between two planes with nodes of their own is an edge.
 //!
 //! Does not live here: which surfaces matter, and what their facets do to a field.
