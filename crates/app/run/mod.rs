@@ -373,7 +373,7 @@ impl Session<'_> {
                 self.accuracy((objective, stop_reason, keeps_all), meshes, (errors, refinements), observer);
             let is_measured = |own: &CurvedFacets| own.change.is_some();
             let facets = result.accuracy.as_ref().and_then(|accuracy| accuracy.facets.as_ref());
-            if self.is_checked(stop_reason) && !facets.is_none_or(is_measured) && (self.interrupted)() {
+            if !facets.is_none_or(is_measured) && (self.interrupted)() {
                 result.status = RunStatus::Interrupted;
             }
         }
