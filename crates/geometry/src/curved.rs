@@ -437,6 +437,7 @@ mod tests {
         let found = surfaces(&arc).farthest().expect("it is curved");
         // A sixth of a parabola, under a slope of a third at the sides and none in the middle.
         let height = 0.1 / (6.0f64 * 2.0).powi(2);
-        assert!((found.off / height - 1.0).abs() < 0.15, "{} {height}", found.off);
+        let ends = found.ends.map(|n| arc.point(n));
+        assert!((found.off / height - 1.0).abs() < 0.15, "{} {height} at {ends:?}", found.off);
     }
 }
