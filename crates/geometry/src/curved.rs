@@ -31,6 +31,9 @@ const SHARED: f64 = 0.01;
 /// The same of the directions in which normals at a rim change, relative to the area of the facets: rounding is no slope.
 const EXTENT: f64 = 1e-4;
 
+/// Share of the spread of normals in one direction above which they turn one way.
+const ONE_WAY: f64 = 0.95;
+
 /// Surfaces of a mesh, curved and flat ones.
 #[derive(Debug)]
 pub struct CurvedSurfaces<'a> {
@@ -255,6 +258,26 @@ impl<'a> CurvedSurfaces<'a> {
             std::array::from_fn(|d| facets.iter().map(|own| own.area * part(own)[d]).sum::<f64>() / total)
         };
         let (place, normal) = (mean(|own| own.middle), mean(|own| own.normal));
+        let away = sub(rim, place);
+        // Normals that turn one way, as of a cylinder, do so by the place in that direction: middles beside each other are no slope.
+        let mut spread = [[0.0; 3]; 3];
+        for own in &facets {
+            let n = sub(own.normal, normal);
+            (0..3).for_each(|d| (0..3).for_each(|k| spread[d][k] += own.area * n[d] * n[k]));
+        }
+        let largest = (0..3).max_by(|&a, &b| spread[a][a].total_cmp(&spread[b][b])).unwrap_or(0);
+        let size = spread[0][0] + spread[1][1] + spread[2][2];
+        let way = spread[largest];
+        let along = dot(way, spread.map(|row| dot(row, way))) / dot(way, way);
+        if along > ONE_WAY * size {
+            let way = unit(way);
+            let of = |own: &RimFacet| [dot(sub(own.middle, place), way), dot(sub(own.normal, normal), way)];
+            let sum = |part: fn([f64; 2]) -> f64| -> f64 {
+                facets.iter().map(|own| own.area * part(of(own))).sum()
+            };
+            let slope = sum(|[x, n]| x * n) / (sum(|[x, _]| x * x) + EXTENT * total * total);
+            return unit(std::array::from_fn(|d| normal[d] + slope * dot(away, way) * way[d]));
+        }
         let (mut moments, mut right) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
         for own in facets {
             let (x, n) = (sub(own.middle, place), sub(own.normal, normal));
@@ -265,7 +288,6 @@ impl<'a> CurvedSurfaces<'a> {
         }
         let extent = EXTENT * total * total;
         (0..3).for_each(|d| moments[d][d] += extent);
-        let away = sub(rim, place);
         unit(std::array::from_fn(|k| normal[k] + dot(solve_symmetric(moments, right[k]), away)))
     }
 
