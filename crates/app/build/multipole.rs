@@ -30,11 +30,6 @@ fn parse(text: &str) -> Option<Harmonic> {
     }
 }
 
-/// A term as it is written.
-pub(crate) fn name(term: Harmonic) -> String {
-    term.to_string()
-}
-
 /// All terms of an expansion, in its order.
 fn terms(set: &MultipoleSet) -> Vec<Harmonic> {
     match set.shape {
@@ -75,7 +70,7 @@ pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
             if !parse(written).is_some_and(|term| all.contains(&term)) {
                 let message = format!("`{written}` is no term of the expansion `{wanted}`");
                 let [first, last] =
-                    [all.first(), all.last()].map(|term| term.copied().map(name).unwrap_or_default());
+                    [all.first(), all.last()].map(|term| term.map(Harmonic::to_string).unwrap_or_default());
                 let fault = source.diagnostic(&format!("{path}.harmonics[{k}]"), message);
                 faults.push(
                     fault.expected(format!("a term from {first} to {last}, or a higher `order` there")),

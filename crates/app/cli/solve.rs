@@ -11,6 +11,7 @@ use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{FileHash, Manifest, RunDirectory, read_design, system_disk};
+use crate::run;
 
 /// What is analysed.
 struct Subject {
@@ -19,7 +20,7 @@ struct Subject {
     /// The file of the design; `None` for the initial one.
     design: Option<PathBuf>,
     /// The folder of the run of the configuration, with the B–H tables that it has read; `None` without a run.
-    run: Option<(PathBuf, Vec<FileHash>)>,
+    of_run: Option<(PathBuf, Vec<FileHash>)>,
 }
 
 /// The configuration to analyse, and the design file: of the result of a run, its configuration and its design.
@@ -27,7 +28,7 @@ fn subject(args: &SolveArgs) -> Result<Subject, Error> {
     let path = &args.common.config;
     if path.file_name() != Some(OsStr::new("result.json")) {
         let (config, source) = args.common.load()?;
-        return Ok(Subject { config, source, design: args.design.clone(), run: None });
+        return Ok(Subject { config, source, design: args.design.clone(), of_run: None });
     }
     // A bare name has an empty folder.
     let folder = std::path::absolute(path).unwrap_or_else(|_| path.clone());
@@ -35,34 +36,28 @@ fn subject(args: &SolveArgs) -> Result<Subject, Error> {
     let directory = RunDirectory::open(&system_disk(), folder)?;
     let mut manifest = Manifest::read(&directory)?;
     manifest.overrides.extend(args.common.overrides.iter().cloned());
-    let (mut config, source) = crate::run::configuration(&directory, &manifest)?;
+    let (mut config, source) = run::configuration(&directory, &manifest)?;
     // Not into the run, which would have to be replaced.
     let mut beside = folder.as_os_str().to_owned();
     beside.push("_solved");
     config.output.directory = beside.into();
     let (config, source) = args.common.checked(config, source)?;
     let design = Some(args.design.clone().unwrap_or_else(|| path.clone()));
-    let run = Some((folder.to_owned(), manifest.tables));
-    Ok(Subject { config, source, design, run })
+    let of_run = Some((folder.to_owned(), manifest.tables));
+    Ok(Subject { config, source, design, of_run })
 }
 
 /// Do what the command line says.
 pub(super) fn solve(args: &SolveArgs) -> Result<ExitCode, Error> {
     let signal = interrupt::watch(interrupt::FINISHES_WORK);
-    let Subject { config, source, design, run } = subject(args)?;
+    let Subject { config, source, design, of_run } = subject(args)?;
     let work = &args.common.work;
     on_all((&config, &source, Mode::Analysis), work, &signal, |options, mut observer| {
         let design = match &design {
-            Some(path) => {
-                let design = read_design(path, variable_count(&config, &source)?)?;
-                Some(match run.clone() {
-                    Some((folder, tables)) => design.of_run(folder, tables),
-                    None => design,
-                })
-            }
+            Some(path) => Some(read_design(path, variable_count(&config, &source)?)?.of_run(of_run.clone())),
             None => None,
         };
-        let result = crate::run::solve(&config, &source, (design, args.refine), options, &mut *observer)?;
+        let result = run::solve(&config, &source, (design, args.refine), options, &mut *observer)?;
         // No bar may stand where the result goes.
         drop(observer);
         if work.json {

@@ -78,10 +78,10 @@ pub struct DesignFile {
 }
 
 impl DesignFile {
-    /// The same, for the configuration of the run in a folder, which has read these B–H tables.
+    /// The same, for the configuration of the run in a folder, which has read these B–H tables; `None` for that of no run.
     #[must_use]
-    pub fn of_run(self, folder: PathBuf, tables: Vec<FileHash>) -> Self {
-        Self { run: Some((folder, tables)), ..self }
+    pub fn of_run(self, run: Option<(PathBuf, Vec<FileHash>)>) -> Self {
+        Self { run, ..self }
     }
 
     /// Whether tables with these hashes of their content are those that the run has read; others have other names.
@@ -219,8 +219,8 @@ mod tests {
         let read = |name: &str, hash: &str| BTreeMap::from([(PathBuf::from(name), hash.to_owned())]);
         let design = read_design(&path, 1).expect("a design");
         design.check_tables(&read("steel.csv", "b")).expect("one of no run");
-        let design = design
-            .of_run("run".into(), vec![FileHash { path: "steel.csv".to_owned(), blake3: "a".to_owned() }]);
+        let tables = vec![FileHash { path: "steel.csv".to_owned(), blake3: "a".to_owned() }];
+        let design = design.of_run(Some(("run".into(), tables)));
         design.check_tables(&read("steel.csv", "a")).expect("its own");
         design.check_tables(&read("other.csv", "b")).expect("another material");
         let error = design.check_tables(&read("steel.csv", "b")).expect_err("changed").to_string();

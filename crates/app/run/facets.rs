@@ -5,6 +5,8 @@
 //! What it does is found by trying: with the nodes of curved surfaces moved until the facets lie on these in the mean
 //! ([`CurvedSurfaces::onto_surfaces`]) bodies have the volume that they are meant to have, and the objective is computed once more.
 
+use std::sync::Arc;
+
 use fluxmorph_geometry::curved::CurvedSurfaces;
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
@@ -26,13 +28,33 @@ const KEPT_VOLUME: f64 = 0.5;
 /// The least part of the way: less would be noise of the linear solver.
 const LEAST_PART: f64 = 1.0 / 8.0;
 
-/// Why a change is not known after a signal.
-const CUT_SHORT: &str = "it was stopped before";
+/// Why it is not known what facets change.
+#[derive(Debug, thiserror::Error)]
+enum NotMeasured {
+    /// A signal came first.
+    #[error("it was stopped before")]
+    CutShort,
+    /// Elements would lose too much of their volume.
+    #[error("elements beside them are too thin to follow")]
+    TooThin,
+    /// The objective leaves the range of numbers.
+    #[error("it is no number")]
+    NotFinite,
+    /// The moved problem cannot be set up or solved.
+    #[error(transparent)]
+    Failed(#[from] Error),
+}
+
+impl From<OptimizerError> for NotMeasured {
+    fn from(error: OptimizerError) -> Self {
+        Self::Failed(error.into())
+    }
+}
 
 /// The facets of a mesh with all its regions, as it was read or generated.
 #[derive(Debug)]
 pub(super) struct FirstFacets {
-    mesh: Mesh,
+    topology: Arc<Topology>,
     /// Of every node that the mesh has more by now, the two in whose middle it lies.
     parents: Vec<[NodeId; 2]>,
     /// Those farthest off their surface; `None` where none is curved.
@@ -42,7 +64,7 @@ pub(super) struct FirstFacets {
 impl FirstFacets {
     /// Those of a mesh.
     pub(super) fn of(config: &Config, mesh: &Mesh) -> Self {
-        Self { mesh: mesh.clone(), parents: Vec::new(), farthest: farthest(config, mesh) }
+        Self { topology: Arc::clone(mesh.topology()), parents: Vec::new(), farthest: farthest(config, mesh) }
     }
 
     /// Goes on to a finer mesh, whose new nodes have these parents.
@@ -52,7 +74,7 @@ impl FirstFacets {
 
     /// The motion of all nodes [m] that brings the facets onto their surfaces, where the nodes lie so [m]; new ones stay in the middle.
     fn onto_surfaces(&self, config: &Config, points: &[Point]) -> Vec<Point> {
-        let topology = self.mesh.topology();
+        let topology = &self.topology;
         let first = &points[..topology.node_count()];
         let mut motion = CurvedSurfaces::new(topology, first, counted(config, topology)).onto_surfaces();
         for &[a, b] in &self.parents {
@@ -167,16 +189,12 @@ impl Session<'_> {
         let mut found = if off(&of_shape) > off(&own) { of_shape } else { own }?;
         if !shapes.is_empty() {
             observer.phase("measuring what the facets of curved surfaces change");
-            let why = match self.changes(shapes) {
-                Ok(Ok(changes)) => {
-                    found.change = Some([changes[0], changes[shapes.len() - 1]]);
-                    None
+            match self.changes(shapes) {
+                Ok(changes) => found.change = Some([changes[0], changes[shapes.len() - 1]]),
+                Err(why) => {
+                    observer
+                        .notice(&format!("what the facets of curved surfaces change is not known: {why}"));
                 }
-                Ok(Err(reason)) => Some(reason.to_owned()),
-                Err(error) => Some(error.to_string()),
-            };
-            if let Some(why) = why {
-                observer.notice(&format!("what the facets of curved surfaces change is not known: {why}"));
             }
         }
         let objectives: Vec<f64> = shapes.iter().map(|(_, objective)| *objective).collect();
@@ -184,12 +202,10 @@ impl Session<'_> {
         Some(found)
     }
 
-    /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about;
-    /// or why that is not known.
-    fn changes(&self, shapes: &[(&Mesh, f64)]) -> Result<Result<Vec<f64>, &'static str>, Error> {
-        if (self.interrupted)() {
-            return Ok(Err(CUT_SHORT));
-        }
+    /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about.
+    fn changes(&self, shapes: &[(&Mesh, f64)]) -> Result<Vec<f64>, NotMeasured> {
+        let check_interrupted = || if (self.interrupted)() { Err(NotMeasured::CutShort) } else { Ok(()) };
+        check_interrupted()?;
         let (config, full, first) = (self.config, &self.setup.full_mesh, &self.facets);
         let remaining = remaining_nodes(config, full.topology());
         let designed = designed_nodes(config, full.topology());
@@ -203,9 +219,7 @@ impl Session<'_> {
         };
         let of_shapes: Vec<Vec<Point>> = shapes.iter().map(|(shape, _)| of_shape(shape)).collect();
         let motions = shapes.iter().zip(&of_shapes).map(|((shape, _), motion)| (*shape, motion));
-        let Some(part) = part_of_the_way(motions.chain([(full, &of_full)])) else {
-            return Ok(Err("elements beside them are too thin to follow"));
-        };
+        let part = part_of_the_way(motions.chain([(full, &of_full)])).ok_or(NotMeasured::TooThin)?;
         let moved = |mesh: &Mesh, motion: &[Point]| {
             let motion: Vec<Point> = motion.iter().map(|m| m.map(|c| part * c)).collect();
             mesh.moved(&motion).map_err(OptimizerError::from)
@@ -213,20 +227,23 @@ impl Session<'_> {
         // Solved as the run was: what is left of its residual is in the objective, and cancels.
         let config = Config { constraints: Vec::new(), ..config.clone() };
         let problem = FinerProblem::new(&config, self.source, &moved(full, &of_full)?, Cut::Halvings(0))?;
-        memory_limit::check_problem(&problem.setup.problem, self.source, OverwritePolicy::Keep)?;
+        memory_limit::check_problem(&problem.setup.problem, self.source, OverwritePolicy::Keep)
+            .map_err(Error::from)?;
         let (cache, mut changes) = (&mut SolverCache::default(), Vec::new());
         for ((shape, objective), motion) in shapes.iter().zip(&of_shapes) {
             if motion.iter().all(|own| *own == [0.0; 3]) {
                 changes.push(0.0);
                 continue;
             }
-            if (self.interrupted)() {
-                return Ok(Err(CUT_SHORT));
-            }
+            check_interrupted()?;
             let found = problem.analyse(&moved(shape, motion)?, cache)?.objective.unwrap_or(f64::NAN);
             changes.push((found - objective) / part);
         }
-        Ok(if changes.iter().all(|change| change.is_finite()) { Ok(changes) } else { Err("it is no number") })
+        if changes.iter().all(|change: &f64| change.is_finite()) {
+            Ok(changes)
+        } else {
+            Err(NotMeasured::NotFinite)
+        }
     }
 }
 

@@ -128,7 +128,7 @@ impl Session<'_> {
             let of_main = coefficients.iter().filter(|(term, _)| main.contains(term));
             let reference = of_main.map(|(_, c)| c.norm_sqr()).sum::<f64>().sqrt();
             let term = |(term, c): &(Harmonic, c64)| HarmonicResult {
-                name: multipole::name(*term),
+                name: term.to_string(),
                 value_t: amplitude(*c, model.angular_frequency()),
                 units: (reference > 0.0).then(|| 1e4 * c.norm() / reference),
             };

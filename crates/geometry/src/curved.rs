@@ -171,12 +171,12 @@ impl<'a> CurvedSurfaces<'a> {
         while let Some(&first) = left.first() {
             let surface = self.surface_at(node, first);
             left.retain(|i| surface.iter().all(|(other, _)| other != i));
-            let (mut area, mut volume, mut total) = ([0.0; 3], 0.0, 0.0);
+            let area = sum(surface.iter().map(|own| self.area_of(*own)));
+            let (mut volume, mut total) = (0.0, 0.0);
             for &(i, direction) in &surface {
-                let own = self.faces[i].area;
-                area = std::array::from_fn(|d| area[d] + direction * own[d]);
-                volume += direction * norm(own) * means[i];
-                total += norm(own);
+                let size = norm(self.faces[i].area);
+                volume += direction * size * means[i];
+                total += size;
             }
             let is_at_the_outside = surface.iter().all(|(i, _)| self.faces[*i].between.1.is_none());
             if is_at_the_outside && surface.iter().all(|(i, _)| means[*i] == 0.0) {
@@ -190,10 +190,8 @@ impl<'a> CurvedSurfaces<'a> {
         let (mut matrix, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
         for (normal, height) in conditions {
             let normal = project_out(&planes, normal);
-            for d in 0..3 {
-                right[d] += height * normal[d];
-                (0..3).for_each(|k| matrix[d][k] += normal[d] * normal[k]);
-            }
+            right = add(right, normal.map(|c| height * c));
+            add_product(&mut matrix, 1.0, [normal, normal]);
         }
         (0..3).for_each(|d| matrix[d][d] += SHARED);
         project_out(&planes, solve_symmetric(matrix, right))
@@ -248,47 +246,33 @@ impl<'a> CurvedSurfaces<'a> {
         for own in surface.clone() {
             (0..3).for_each(|k| self.go_on(own, k, &mut surface));
         }
-        Self::at_rim(self.points[node.index()], self.facets_of(surface))
+        Self::at_rim(self.points[node.index()], &self.facets_of(surface))
     }
 
     /// The normal of a surface at a rim of it [m], from facets behind, as a linear function of the place.
-    fn at_rim(rim: Point, facets: Vec<RimFacet>) -> Point {
+    fn at_rim(rim: Point, facets: &[RimFacet]) -> Point {
         let total: f64 = facets.iter().map(|own| own.area).sum();
         let mean = |part: fn(&RimFacet) -> Point| -> Point {
             std::array::from_fn(|d| facets.iter().map(|own| own.area * part(own)[d]).sum::<f64>() / total)
         };
         let (place, normal) = (mean(|own| own.middle), mean(|own| own.normal));
-        let away = sub(rim, place);
-        // Normals that turn one way, as of a cylinder, do so by the place in that direction: middles beside each other are no slope.
         let mut spread = [[0.0; 3]; 3];
-        for own in &facets {
-            let n = sub(own.normal, normal);
-            (0..3).for_each(|d| (0..3).for_each(|k| spread[d][k] += own.area * n[d] * n[k]));
-        }
-        let largest = (0..3).max_by(|&a, &b| spread[a][a].total_cmp(&spread[b][b])).unwrap_or(0);
-        let size = spread[0][0] + spread[1][1] + spread[2][2];
-        let way = spread[largest];
-        let along = dot(way, spread.map(|row| dot(row, way))) / dot(way, way);
-        if along > ONE_WAY * size {
-            let way = unit(way);
-            let of = |own: &RimFacet| [dot(sub(own.middle, place), way), dot(sub(own.normal, normal), way)];
-            let sum = |part: fn([f64; 2]) -> f64| -> f64 {
-                facets.iter().map(|own| own.area * part(of(own))).sum()
-            };
-            let slope = sum(|[x, n]| x * n) / (sum(|[x, _]| x * x) + EXTENT * total * total);
-            return unit(std::array::from_fn(|d| normal[d] + slope * dot(away, way) * way[d]));
-        }
-        let (mut moments, mut right) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
         for own in facets {
-            let (x, n) = (sub(own.middle, place), sub(own.normal, normal));
-            for d in 0..3 {
-                (0..3).for_each(|k| moments[d][k] += own.area * x[d] * x[k]);
-                (0..3).for_each(|k| right[k][d] += own.area * n[k] * x[d]);
-            }
+            let turn = sub(own.normal, normal);
+            add_product(&mut spread, own.area, [turn, turn]);
         }
-        let extent = EXTENT * total * total;
-        (0..3).for_each(|d| moments[d][d] += extent);
-        unit(std::array::from_fn(|k| normal[k] + dot(solve_symmetric(moments, right[k]), away)))
+        // Normals that turn one way, as of a cylinder, do so by the place in that direction: middles beside each other are no slope.
+        let way = one_way(spread);
+        let seen = |v: Point| way.map_or(v, |way| way.map(|c| dot(v, way) * c));
+        let (mut moments, mut slopes) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
+        for own in facets {
+            let (x, turn) = (seen(sub(own.middle, place)), seen(sub(own.normal, normal)));
+            add_product(&mut moments, own.area, [x, x]);
+            add_product(&mut slopes, own.area, [turn, x]);
+        }
+        (0..3).for_each(|d| moments[d][d] += EXTENT * total * total);
+        let away = sub(rim, place);
+        unit(std::array::from_fn(|k| normal[k] + dot(solve_symmetric(moments, slopes[k]), away)))
     }
 
     /// The facets of which some faces are parts: faces in one plane, with what goes on in that plane beside them, are one, whose
@@ -366,6 +350,21 @@ fn project_out(normals: &[Point], vector: Point) -> Point {
         let along = dot(v, *n);
         std::array::from_fn(|d| v[d] - along * n[d])
     })
+}
+
+/// Adds the product `a bᵀ` of two vectors.
+fn add_product(matrix: &mut [Point; 3], weight: f64, [a, b]: [Point; 2]) {
+    for d in 0..3 {
+        (0..3).for_each(|k| matrix[d][k] += weight * a[d] * b[k]);
+    }
+}
+
+/// The direction that nearly all of a sum of products `a aᵀ` is in; `None` where there are several.
+fn one_way(products: [Point; 3]) -> Option<Point> {
+    let largest = (0..3).max_by(|&a, &b| products[a][a].total_cmp(&products[b][b]))?;
+    let way = unit(products[largest]);
+    let along = dot(way, products.map(|row| dot(row, way)));
+    (along > ONE_WAY * (products[0][0] + products[1][1] + products[2][2])).then_some(way)
 }
 
 /// The solution of a symmetric, positive definite system.

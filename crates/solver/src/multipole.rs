@@ -9,9 +9,8 @@
 //! Lives here: points and weights. Does not live here: the field at them ([`crate::recovery`]), functions of the coefficients
 //! ([`crate::functional`]).
 
-use std::fmt;
-
 use std::f64::consts::PI;
+use std::fmt;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, centroid};

@@ -1,11 +1,12 @@
 //! Before and after: the terms of an expansion beside its main ones.
 
+use fluxmorph_solver::multipole::Harmonic;
 use maud::{Markup, html};
 
 use super::bars::{self, Row};
 use super::plot::svg;
 use super::ticks::number;
-use crate::build::multipole::{main_terms, name};
+use crate::build::multipole::main_terms;
 use crate::config::Config;
 use crate::files::{HarmonicResult, MultipoleResult, RunResult};
 
@@ -14,7 +15,7 @@ pub(super) fn figures(config: &Config, result: &RunResult) -> Markup {
     let before = result.initial.first().map_or(&[][..], |state| state.multipoles.as_slice());
     html! {
         @for (k, (set, after)) in config.multipoles.iter().zip(&result.multipoles).enumerate() {
-            @let main: Vec<String> = main_terms(set).into_iter().map(name).collect();
+            @let main: Vec<String> = main_terms(set).iter().map(Harmonic::to_string).collect();
             @let shown = shown(&main, [before.get(k), Some(after)]);
             @if !shown.is_empty() {
                 figure class="narrow" {
