@@ -1,5 +1,5 @@
 //! What the field of a design says against the model it was computed with: iron beyond saturation with a linear law, skins
-//! that the mesh or the impedance surface of that design does not carry.
+//! that the mesh or the impedance surface of that design does not carry, losses at sharp edges that an impedance surface lacks.
 //!
 //! `check` cannot know it. It is said at the end of a run or an analysis, and kept in `result.json`.
 
@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, Mesh, Readable, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_solver::audit::weighted_median;
+use fluxmorph_solver::audit::{EdgeLoss, edge_losses, weighted_median};
 use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
@@ -22,6 +22,9 @@ use crate::files::ObjectiveResult;
 /// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
 /// Bozorth, Ferromagnetism, 1951), ferrites at 0.5.
 const SATURATION: f64 = 2.0;
+
+/// Share of the loss of an impedance surface that its edges may lack without a word.
+const LACKED: f64 = 0.01;
 
 /// Share of a region's volume that must lie beyond it: elements at re-entrant corners have a field that grows with refinement.
 const TOLERATED_SHARE: f64 = 1e-3;
@@ -53,6 +56,7 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
     all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
+    all.extend(losses_at_edges(problem, analysis));
     let least = problem
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
@@ -97,6 +101,34 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
             })
         })
         .collect()
+}
+
+/// Losses that impedance surfaces lack at their sharp edges, of each where that is the largest share.
+fn losses_at_edges(problem: &Problem, analysis: &Analysis) -> Vec<String> {
+    let mut worst: BTreeMap<String, (f64, EdgeLoss, &FieldModel)> = BTreeMap::new();
+    for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
+        for found in edge_losses(model, &analysis.mesh, solution) {
+            let share = found.more / found.of_surface;
+            let largest = worst.get(&found.region).map_or(LACKED, |(share, ..)| *share);
+            if share > largest {
+                worst.insert(found.region.clone(), (share, found, model));
+            }
+        }
+    }
+    let text = |(share, found, model): &(f64, EdgeLoss, &FieldModel)| {
+        let load = model.setup().load_case.as_ref();
+        format!(
+            "`{}` has about {:.1} % more loss at {} Hz{} than the {:.3e} W of its impedance surface (of what is meshed): beside a sharp \
+             edge a conductor is no half space. No error bar counts that; where its loss matters, mesh it (model = \"volume\"), or mesh its \
+             edges round",
+            found.region,
+            100.0 * share,
+            Readable(model.setup().frequency),
+            load.map_or(String::new(), |load| format!(" under the load `{load}`")),
+            found.of_surface
+        )
+    };
+    worst.values().map(text).collect()
 }
 
 /// Skin audits of iron with a B–H curve, of the permeability that the fields leave at its surface.

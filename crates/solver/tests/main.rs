@@ -12,6 +12,7 @@ mod open;
 mod prisms;
 mod recovery;
 mod saturation;
+mod sharp_edges;
 mod sheet;
 mod solid;
 mod sources;
