@@ -1,5 +1,6 @@
 //! What the field of a design says against the model it was computed with: iron beyond saturation with a linear law, skins
-//! that the mesh or the impedance surface of that design does not carry, losses at sharp edges that an impedance surface lacks.
+//! that the mesh or the impedance surface of that design does not carry, losses that impedance
+//! surfaces leave out.
 //!
 //! `check` cannot know it. It is said at the end of a run or an analysis, and kept in `result.json`.
 
@@ -8,7 +9,7 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, Mesh, Readable, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_solver::audit::{EdgeLoss, edge_losses, weighted_median};
+use fluxmorph_solver::audit::{LeftOut, left_out, weighted_median};
 use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
@@ -23,8 +24,8 @@ use crate::files::ObjectiveResult;
 /// Bozorth, Ferromagnetism, 1951), ferrites at 0.5.
 const SATURATION: f64 = 2.0;
 
-/// Share of the loss of an impedance surface that its edges may lack without a word.
-const LACKED: f64 = 0.01;
+/// Share of the loss of an impedance surface that may be left out without a word.
+const LEFT_OUT: f64 = 0.01;
 
 /// Share of a region's volume that must lie beyond it: elements at re-entrant corners have a field that grows with refinement.
 const TOLERATED_SHARE: f64 = 1e-3;
@@ -56,7 +57,7 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
     all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
-    all.extend(losses_at_edges(problem, analysis));
+    all.extend(left_out_of_losses(problem, analysis));
     let least = problem
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
@@ -103,29 +104,32 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
         .collect()
 }
 
-/// Losses that impedance surfaces lack at their sharp edges, of each where that is the largest share.
-fn losses_at_edges(problem: &Problem, analysis: &Analysis) -> Vec<String> {
-    let mut worst: BTreeMap<String, (f64, EdgeLoss, &FieldModel)> = BTreeMap::new();
+/// What impedance surfaces leave out of losses, of each where that is the largest share.
+fn left_out_of_losses(problem: &Problem, analysis: &Analysis) -> Vec<String> {
+    let mut worst: BTreeMap<String, (LeftOut, &FieldModel)> = BTreeMap::new();
     for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
-        for found in edge_losses(model, &analysis.mesh, solution) {
-            let share = found.more / found.of_surface;
-            let largest = worst.get(&found.region).map_or(LACKED, |(share, ..)| *share);
-            if share > largest {
-                worst.insert(found.region.clone(), (share, found, model));
+        for found in left_out(model, &analysis.mesh, solution) {
+            let largest = worst.get(&found.region).map_or(LEFT_OUT, |(own, _)| own.share().abs());
+            if found.share().abs() > largest {
+                worst.insert(found.region.clone(), (found, model));
             }
         }
     }
-    let text = |(share, found, model): &(f64, EdgeLoss, &FieldModel)| {
+    let text = |(found, model): &(LeftOut, &FieldModel)| {
         let load = model.setup().load_case.as_ref();
+        let more = if found.share() > 0.0 { "more" } else { "less" };
+        let (why, cure) = if found.at_edges.abs() > found.of_curvature.abs() {
+            ("at its sharp edges", ", or mesh its edges round")
+        } else {
+            ("where it is round", "")
+        };
         format!(
-            "`{}` has about {:.1} % more loss at {} Hz{} than the {:.3e} W of its impedance surface (of what is meshed): beside a sharp \
-             edge a conductor is no half space. No error bar counts that; where its loss matters, mesh it (model = \"volume\"), or mesh its \
-             edges round",
+            "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}: there a conductor is no half \
+             space, and no error bar counts that. Where its loss matters, mesh it (model = \"volume\"){cure}",
             found.region,
-            100.0 * share,
+            100.0 * found.share().abs(),
             Readable(model.setup().frequency),
             load.map_or(String::new(), |load| format!(" under the load `{load}`")),
-            found.of_surface
         )
     };
     worst.values().map(text).collect()

@@ -112,7 +112,7 @@ pub enum SolverError {
     Boxed { region: String },
     /// The iteration did not reach its residual.
     #[error(
-        "the linear solver stopped at the relative residual {residual:e} after {iterations} iterations, not at the \
+        "the linear solver stopped at the relative residual {residual:.1e} after {iterations} iterations, not at the \
          {required:e} required: {cause}"
     )]
     NotConverged {

@@ -98,7 +98,7 @@ fn apex(triangle: [NodeId; 3], edge: [NodeId; 2]) -> NodeId {
 
 /// How two outer faces meet.
 #[derive(Clone, Copy)]
-pub(crate) enum Bend {
+enum Bend {
     /// Two facets of one surface.
     Smooth,
     /// The domain has an interior angle below 180°.
@@ -107,7 +107,7 @@ pub(crate) enum Bend {
     Reentrant,
 }
 
-pub(crate) fn bend(mesh: &Mesh, edge: [NodeId; 2], [one, other]: [[NodeId; 3]; 2]) -> Bend {
+fn bend(mesh: &Mesh, edge: [NodeId; 2], [one, other]: [[NodeId; 3]; 2]) -> Bend {
     let apex = apex(other, edge);
     let [n, m] = [one, other].map(|triangle| area_vector(triangle.map(|n| mesh.point(n))));
     if dot(n, m) > CREASE.to_radians().cos() * norm(n) * norm(m) {

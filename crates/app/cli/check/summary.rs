@@ -23,8 +23,8 @@ use crate::build::{
     stiffness_policy,
 };
 use crate::config::{
-    self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, Material, MeshConfig, Objective,
-    Open, Optimizer, Probe, RegionModel, Remesh, SourceMap,
+    self, Boundaries, Coil, Config, Constraint, Design, Generator, Load, Material, MeshConfig, MultipoleSet,
+    Objective, Open, Optimizer, Probe, RegionModel, Remesh, SourceMap,
 };
 use crate::error::Error;
 use crate::files::OverwritePolicy;
@@ -87,6 +87,8 @@ pub(super) struct Summary<'a> {
     pub(super) remesh: Option<&'a Remesh>,
     pub(super) optimizer: &'a Optimizer,
     pub(super) probes: &'a [Probe],
+    #[serde(skip_serializing_if = "<[MultipoleSet]>::is_empty")]
+    pub(super) multipoles: &'a [MultipoleSet],
     pub(super) output_directory: String,
     pub(super) memory_estimate_bytes: usize,
     /// Where `--estimate` asks for it.
@@ -250,6 +252,7 @@ pub(super) fn summary<'a>(
         remesh: config.remesh.as_ref(),
         optimizer: &config.optimizer,
         probes: &config.probes,
+        multipoles: &config.multipoles,
         output_directory: config.output.directory.display().to_string(),
         memory_estimate_bytes: memory::peak(config, &setup)?,
         estimate: None,

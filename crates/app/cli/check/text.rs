@@ -145,6 +145,14 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
         let probe = |p: &crate::config::Probe| format!("{} ({})", p.name, p.points.len());
         row("probes (points)", summary.probes.iter().map(probe).collect::<Vec<_>>().join(", "));
     }
+    for set in summary.multipoles {
+        let (radius, [x, y, z]) = (millimetre(set.radius), set.center.map(millimetre));
+        let shape = set.shape.name();
+        row(
+            "expansion",
+            format!("{}: {shape} of {radius} mm at ({x}, {y}, {z}) mm, up to order {}", set.name, set.order),
+        );
+    }
 }
 
 /// The objective in a line: its goal, its terms and its unit.

@@ -55,7 +55,8 @@ choice! {
     /// Where a field is expanded.
     pub enum ExpansionShape {
         /// On a circle: normal and skew harmonics b_n and a_n of the field across its axis,
-        /// B_y + i B_x = Σ (b_n + i a_n) ((x + i y)/`radius`)^(n−1).
+        /// B_y + i B_x = Σ (b_n + i a_n) ((x + i y)/`radius`)^(n−1), from the radial component on the circle. Where the field changes
+        /// along the axis, as at the end of a magnet, other components have other terms.
         Circle = "circle",
         /// In a ball: spherical harmonics of the component along its axis,
         /// Σ (r/`radius`)^n P_nm(cos θ) (c_nm cos mφ + s_nm sin mφ), P_nm without normalisation or phase.

@@ -5,11 +5,11 @@
 //! (docs/verification.md). The audit looks at the first layer of elements under every conductor face, and at all others down
 //! to three depths (`layers`).
 
-mod edges;
+mod half_space;
 mod layers;
 mod nodal;
 
-pub use edges::{EdgeLoss, edge_losses};
+pub use half_space::{LeftOut, left_out};
 pub use layers::CoarseLayers;
 pub use nodal::NodalErrors;
 
