@@ -53,7 +53,7 @@ impl Device {
         let (cache, mut none) = (&mut SolverCache::default(), NoProgress);
         let analysis = problem.analyse(moved, Derivatives::None, cache, &mut none).map_err(|e| said(&e))?;
         let models = &mut EnrichedModels::new(Effort::Any);
-        let estimate = problem.estimate_error(&analysis, models).map_err(|e| said(&e))?;
+        let estimate = problem.estimate_error(&analysis, models, &mut |_, _, _| {}).map_err(|e| said(&e))?;
         let value = analysis.objective.expect("an objective");
         Ok((value, estimate.objective, [setup.full_mesh.clone(), analysis.mesh]))
     }
@@ -142,8 +142,9 @@ fn an_estimate_has_the_bits_of_one_alone_whatever_was_estimated_with_its_models_
     let models = &mut EnrichedModels::new(Effort::Any);
     for height in [0.0, 3e-3, 0.0] {
         let analysis = analysed(height);
-        let shared = problem.estimate_error(&analysis, models).expect("an estimate");
-        let alone = problem.estimate_error(&analysis, &mut EnrichedModels::new(Effort::Any));
+        let shared = problem.estimate_error(&analysis, models, &mut |_, _, _| {}).expect("an estimate");
+        let alone =
+            problem.estimate_error(&analysis, &mut EnrichedModels::new(Effort::Any), &mut |_, _, _| {});
         assert_eq!(shared, alone.expect("an estimate"));
     }
 }
@@ -159,7 +160,11 @@ fn the_error_of_a_worst_case_knows_the_terms_that_are_the_worst_without_theirs()
         problem.analyse(moved, Derivatives::None, cache, &mut NoProgress).expect("a field")
     };
     let estimated = |problem: &Problem| {
-        let estimate = problem.estimate_error(&analysed(problem), &mut EnrichedModels::new(Effort::Any));
+        let estimate = problem.estimate_error(
+            &analysed(problem),
+            &mut EnrichedModels::new(Effort::Any),
+            &mut |_, _, _| {},
+        );
         estimate.expect("an estimate").objective
     };
     let values = analysed(&problem).terms;

@@ -2,7 +2,8 @@
 
 use fluxmorph_optimizer::Error;
 
-use super::result::{ProbeResult, RunResult};
+use super::result::RunResult;
+use super::state_result::ProbeResult;
 
 /// What to do about a number that is not finite.
 const SUM: &str = "expected a finite number; check weights, currents and units";

@@ -18,6 +18,7 @@ mod refinements;
 mod result;
 mod run_directory;
 mod run_files;
+mod state_result;
 mod synced;
 
 use std::path::{Path, PathBuf};
@@ -37,12 +38,15 @@ pub(crate) use names::shell_word;
 pub use names::{extend_command, resume_command, surface_files};
 pub use refinements::{RefinementStep, Refinements};
 pub use result::{
-    Amplitude, CoilResult, ConstraintResult, DesignResult, HarmonicResult, HomogeneityResult,
-    LinearSolverResult, MeshResult, MultipoleResult, ObjectiveResult, OpenResult, ProbeResult, RunResult,
-    SaturatedRegion, SaturationResult, StateResult, TermResult, Verification, VerificationMesh,
+    ConstraintResult, DesignResult, HomogeneityResult, LinearSolverResult, MeshResult, ObjectiveResult,
+    OpenResult, RunResult, TermResult, Verification, VerificationMesh,
 };
 pub(crate) use run_directory::LOCK;
 pub use run_directory::{OverwritePolicy, RunDirectory};
+pub use state_result::{
+    Amplitude, CoilResult, ForceError, HarmonicResult, MultipoleResult, ProbeResult, SaturatedRegion,
+    SaturationResult, StateErrors, StateResult,
+};
 pub use synced::SyncedLog;
 pub(crate) use synced::write_whole;
 

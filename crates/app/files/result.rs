@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 use super::accuracy::Accuracy;
 use super::json::{read_json, to_json};
 use super::manifest::RunStatus;
+use super::state_result::{
+    CoilResult, MultipoleResult, ProbeResult, SaturationResult, StateErrors, StateResult,
+};
 use super::{OutputError, RunDirectory};
 
 /// Largest file that is read [bytes].
@@ -55,6 +58,9 @@ pub struct RunResult {
     /// Force and torque on every body of the configuration, at the first frequency.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<BodyForce>,
+    /// Estimated errors of losses, forces, probes and flux linkages; `None` where there is no estimate.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub errors: Option<StateErrors>,
     /// Newton's method and saturation, where there is a B–H curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturation: Option<SaturationResult>,
@@ -92,57 +98,16 @@ pub struct RunResult {
 }
 
 impl RunResult {
+    /// Enters the estimated errors of what its states report, in their order.
+    pub fn enter_errors(&mut self, of_states: &[Option<StateErrors>]) {
+        self.errors = of_states.first().cloned().flatten();
+        self.states.iter_mut().zip(of_states).for_each(|(state, errors)| state.errors.clone_from(errors));
+    }
+
     /// Names of the constraints that the best design violates.
     pub fn violated(&self) -> Vec<String> {
         self.constraints.iter().filter(|own| !own.satisfied).map(|own| own.name.clone()).collect()
     }
-}
-
-/// An expansion of the flux density.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct MultipoleResult {
-    /// Its name.
-    pub name: String,
-    /// Reference radius [m].
-    pub radius_m: f64,
-    /// Its terms.
-    pub terms: Vec<HarmonicResult>,
-}
-
-/// One term of an expansion.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct HarmonicResult {
-    /// Its name, such as `b3` or `c2_0`.
-    pub name: String,
-    /// The coefficient [T].
-    pub value_t: Amplitude,
-    /// Its magnitude relative to that of the main order, in units of 1e-4; `null` where there is no main field.
-    pub units: Option<f64>,
-}
-
-/// What the terminals of a coil see; of the meshed part.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CoilResult {
-    /// Its name.
-    pub name: String,
-    /// Current [A].
-    pub current_a: Amplitude,
-    /// Flux linkage [Wb].
-    pub flux_linkage_wb: Amplitude,
-    /// Resistance of the wire, and of the losses that its current alone makes [Ω].
-    pub resistance_ohm: f64,
-    /// Voltage across it [V].
-    pub voltage_v: Amplitude,
-}
-
-/// A number in statics, the real and imaginary part of a peak phasor in harmonics.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Amplitude {
-    /// In statics.
-    Static(f64),
-    /// In harmonics.
-    Phasor([f64; 2]),
 }
 
 /// The part of open space in the field.
@@ -271,60 +236,6 @@ pub struct ConstraintResult {
     pub error_estimate: Option<f64>,
 }
 
-/// A nonlinear solution, and how far it goes into the curves.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SaturationResult {
-    /// Steps of Newton's method, its linear start included.
-    pub newton_steps: usize,
-    /// Every region with a B–H curve.
-    pub regions: Vec<SaturatedRegion>,
-}
-
-/// How far a region goes into its curve.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SaturatedRegion {
-    /// The region.
-    pub region: String,
-    /// Largest `|B|` of an element's mean [T].
-    pub highest_b_t: f64,
-    /// Where [m].
-    pub place_m: [f64; 3],
-    /// Last `B` of the curve's points [T]; `None` for a curve in closed form.
-    pub table_ends_b_t: Option<f64>,
-    /// Where its knee is: the `B` beyond which the differential permeability is below a tenth of its largest [T]; `None` where
-    /// there is no such field.
-    #[serde(default)]
-    pub knee_b_t: Option<f64>,
-    /// Share of its volume beyond the knee: where the differential permeability is below a tenth of its largest.
-    pub volume_share_beyond_knee: f64,
-}
-
-/// What depends on the frequency and on the load.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct StateResult {
-    /// The load, where there are some.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub load: Option<String>,
-    /// The frequency [Hz].
-    pub frequency_hz: f64,
-    /// Eddy-current loss by region, of the meshed part [W].
-    pub losses_w: BTreeMap<String, f64>,
-    /// The field at the probes.
-    pub probes: Vec<ProbeResult>,
-    /// Force and torque on every body.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub forces: Vec<BodyForce>,
-    /// Newton's method and saturation, where there is a B–H curve.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub saturation: Option<SaturationResult>,
-    /// What the terminals of the coils with `turns` see.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub coils: Vec<CoilResult>,
-    /// The field expanded in circles and balls.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub multipoles: Vec<MultipoleResult>,
-}
-
 /// The best design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DesignResult {
@@ -351,19 +262,6 @@ pub struct MeshResult {
     pub worst_quality_initial: f64,
     /// Worst quality of the mesh of the best design.
     pub worst_quality_final: f64,
-}
-
-/// The field at the points of one probe, shapes `(n_points, 3)`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ProbeResult {
-    /// The probe's name.
-    pub name: String,
-    /// The points [m].
-    pub points_m: Vec<[f64; 3]>,
-    /// Real part of B [T]; `null` for a point that the moved mesh no longer holds.
-    pub b_re_t: Vec<Option<[f64; 3]>>,
-    /// Imaginary part of B [T]; `null` likewise.
-    pub b_im_t: Vec<Option<[f64; 3]>>,
 }
 
 /// The linear systems of a run.
@@ -480,6 +378,7 @@ pub(crate) mod tests {
             probes: vec![],
             losses_w: [("plate".to_owned(), 12.5)].into(),
             forces: Vec::new(),
+            errors: None,
             saturation: None,
             states: vec![],
             initial: vec![],

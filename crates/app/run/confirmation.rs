@@ -9,11 +9,11 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::driver::Best;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, Problem};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem};
 use fluxmorph_remesh::Moved;
 
 use super::Session;
-use super::estimate::{Estimator, left_out};
+use super::estimate::{Estimate, Estimator, left_out};
 use super::finer::{Cut, FinerProblem, looked_at_once};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
@@ -74,9 +74,9 @@ impl Session<'_> {
         &self,
         initial: InitialField,
         (best, stop_reason): (&Best, StopReason),
-        at_best: Option<ErrorEstimate>,
+        at_best: Option<Estimate>,
         observer: &mut dyn Observer,
-    ) -> Option<[ErrorEstimate; 2]> {
+    ) -> Option<[Estimate; 2]> {
         let is_wanted =
             self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
         let is_of_field = self.has_field_objective()

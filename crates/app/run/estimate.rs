@@ -10,13 +10,15 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::Constraint;
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, EnrichedModels, ErrorEstimate, Measured, Problem, SolverCache};
-use fluxmorph_solver::SolverError;
 use fluxmorph_solver::enrichment::Effort;
+use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
 
 use super::finer::{Cut, FinerProblem, looked_at_once};
+use super::reported::{self, Reported};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, SourceMap};
 use crate::error::Error;
+use crate::files::StateErrors;
 use crate::show::Observer;
 
 /// Bytes that an estimate takes beside the problem, for each tetrahedron and for each with ψ, all of whose second order the coarse
@@ -38,7 +40,8 @@ fn is_asked_for(config: &Config) -> bool {
 /// Bytes that the process holds at the peak of an estimate, about; `None` where none is wanted.
 pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
     let is_second_order = config.analysis.order == ElementOrder::Quadratic;
-    let is_wanted = config.accuracy.estimate != Some(false) && problem.objective().is_some();
+    let is_of_something = problem.objective().is_some() || reported::is_something(config, problem);
+    let is_wanted = config.accuracy.estimate != Some(false) && is_of_something;
     if !is_wanted || problem.share().is_some() || is_second_order && !is_asked_for(config) {
         return None;
     }
@@ -51,6 +54,15 @@ pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
         Elements::Edge => sizes.beside(edge),
         Elements::Nodal => sizes.beside(nodal),
     })
+}
+
+/// The estimated errors of an analysis.
+#[derive(Clone)]
+pub(crate) struct Estimate {
+    /// Of objective and constraints.
+    pub(crate) errors: ErrorEstimate,
+    /// Of what each state reports beside.
+    pub(crate) of_states: Vec<Option<StateErrors>>,
 }
 
 /// Estimates the errors of analyses of one problem; what does not depend on the design is set up once.
@@ -78,11 +90,7 @@ impl<'a> Estimator<'a> {
     }
 
     /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
-    pub(crate) fn estimate(
-        &mut self,
-        analysis: &Analysis,
-        observer: &mut dyn Observer,
-    ) -> Option<ErrorEstimate> {
+    pub(crate) fn estimate(&mut self, analysis: &Analysis, observer: &mut dyn Observer) -> Option<Estimate> {
         if let Some(shortage) = memory_limit::shortage(memory(self.config, self.problem)?) {
             observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
             return None;
@@ -91,7 +99,7 @@ impl<'a> Estimator<'a> {
         let estimated = if self.config.analysis.order == ElementOrder::Quadratic {
             self.on_halved_edges(analysis)
         } else {
-            self.problem.estimate_error(analysis, &mut self.models).map_err(Error::from)
+            self.by_order(analysis)
         };
         match estimated {
             Ok(estimate) => Some(estimate),
@@ -107,8 +115,21 @@ impl<'a> Estimator<'a> {
         }
     }
 
+    /// Of first order, by one order more.
+    fn by_order(&mut self, analysis: &Analysis) -> Result<Estimate, Error> {
+        let (config, problem, mesh) = (self.config, self.problem, &analysis.mesh);
+        let of_run = (config, problem.bodies());
+        let mut of_states = vec![None; problem.states().len()];
+        let mut look = |index: usize, model: &FieldModel, solution: &FieldSolution| {
+            let own = Reported::of(of_run, (&problem.states()[index], mesh, &analysis.solutions[index]));
+            of_states[index] = own.errors(&Reported::of(of_run, (model, mesh, solution)), 1.0);
+        };
+        let errors = problem.estimate_error(analysis, &mut self.models, &mut look)?;
+        Ok(Estimate { errors, of_states })
+    }
+
     /// Of second order, without the places where the error is made.
-    fn on_halved_edges(&mut self, analysis: &Analysis) -> Result<ErrorEstimate, Error> {
+    fn on_halved_edges(&mut self, analysis: &Analysis) -> Result<Estimate, Error> {
         let finer = match self.finer.take() {
             Some(finer) => finer,
             None => {
@@ -116,7 +137,8 @@ impl<'a> Estimator<'a> {
                 FinerProblem::new(&config, self.source, self.full_mesh, Cut::Halvings(1))?
             }
         };
-        let found = self.finer.insert(finer).analyse(&analysis.mesh, &mut SolverCache::default())?;
+        let finer = self.finer.insert(finer);
+        let found = finer.analyse(&analysis.mesh, &mut SolverCache::default())?;
         let error = |(fine, coarse): (f64, f64)| OF_HALVED_EDGES * (fine - coarse);
         let values = |own: &Analysis| match own.member_values() {
             members if members.is_empty() => vec![own.objective.unwrap_or(f64::NAN)],
@@ -129,12 +151,22 @@ impl<'a> Estimator<'a> {
         let of_constraint = |((k, _), fine): ((usize, &Constraint), &Measured)| {
             (k, error((fine.value, analysis.constraints[k].value)))
         };
-        Ok(ErrorEstimate {
-            objective: problem.error_of_objective(analysis, &errors).1,
+        let errors = ErrorEstimate {
+            objective: problem.objective().map_or(0.0, |_| problem.error_of_objective(analysis, &errors).1),
             constraints: constrained.zip(&found.constraints).map(of_constraint).collect(),
             by_element: Vec::new(),
             iterations: found.linear_iterations,
-        })
+        };
+        let reported = |problem: &Problem, analysis: &Analysis| -> Vec<Reported> {
+            let states = problem.states().iter().zip(&analysis.solutions);
+            let of = |(model, solution)| {
+                Reported::of((self.config, problem.bodies()), (model, &analysis.mesh, solution))
+            };
+            states.map(of).collect()
+        };
+        let pairs = reported(problem, analysis).into_iter().zip(reported(&finer.setup.problem, &found));
+        let of_states = pairs.map(|(own, better)| own.errors(&better, OF_HALVED_EDGES)).collect();
+        Ok(Estimate { errors, of_states })
     }
 }
 

@@ -19,7 +19,7 @@ use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Problem};
 
 use super::Session;
-use super::estimate::Estimator;
+use super::estimate::{Estimate, Estimator};
 use super::journal::mesh_hash;
 use crate::build::{Mode, RefinedMesh, Setup, memory_limit, remaining_elements, set_up_on};
 use crate::config::{Config, SourceMap};
@@ -141,7 +141,7 @@ impl<'a> Levels<'a> {
         problem: &Problem,
         analysis: &Analysis,
         observer: &mut dyn Observer,
-    ) -> Option<ErrorEstimate> {
+    ) -> Option<Estimate> {
         let of_problem = (problem, self.mesh.mesh());
         Estimator::new((self.config, self.source), of_problem).estimate(analysis, observer)
     }
@@ -302,7 +302,7 @@ impl Supervisor for Levels<'_> {
             &Looked {
                 problem,
                 analysis: best,
-                estimate: &estimate,
+                estimate: &estimate.errors,
                 scale: initial.abs().max(best.objective.map_or(0.0, f64::abs)),
                 evaluations,
                 is_out_of_time: deadline.is_some_and(|deadline| Instant::now() >= deadline),

@@ -18,6 +18,7 @@ pub mod morph;
 mod pieces;
 mod prepared;
 mod recorder;
+mod reported;
 mod reservations;
 mod resume;
 mod search;
@@ -243,12 +244,15 @@ impl Session<'_> {
         let errors = self.estimate_errors(first, (best, reason), at_best, observer);
         if let Some([at_initial, at_best]) = &errors {
             let of_run = (&self.setup.problem, &optimised.bounds[..]);
-            enter_errors(&mut result.constraints, of_run, (Some(at_initial), at_best), observer);
+            let of_both = (Some(&at_initial.errors), &at_best.errors);
+            enter_errors(&mut result.constraints, of_run, of_both, observer);
+            result.enter_errors(&at_best.of_states);
+            let at_best = &at_best.errors;
             if at_best.by_element.iter().any(|error| *error != 0.0) {
                 recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
             }
         }
-        let errors = errors.map(|errors| errors.map(|estimate| estimate.objective));
+        let errors = errors.map(|errors| errors.map(|estimate| estimate.errors.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         let members = [optimised.initial_members.clone(), best.analysis.member_values()];
         let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved, members };

@@ -6,10 +6,11 @@ use std::time::Instant;
 use fluxmorph_geometry::NodeId;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason, Supervisor, Unsupervised};
-use fluxmorph_optimizer::problem::{Derivatives, ErrorEstimate, NoProgress, SolverCache};
+use fluxmorph_optimizer::problem::{Derivatives, NoProgress, SolverCache};
 use fluxmorph_remesh::Moved;
 
 use super::Session;
+use super::estimate::Estimate;
 use super::levels::{Levels, Looked, Refined};
 use super::recorder::DirectoryRecorder;
 use crate::config::ElementOrder;
@@ -24,7 +25,7 @@ pub(super) struct Searched {
     /// The initial shape on the mesh of the last search.
     pub(super) first: Moved,
     /// The estimated error of the best design, where it is known already.
-    pub(super) at_best: Option<ErrorEstimate>,
+    pub(super) at_best: Option<Estimate>,
     /// How the mesh was refined; `None` without a tolerance.
     pub(super) refinements: Option<Refinements>,
     /// Of every node that the mesh of the configuration does not have, the two in whose middle it lies.
@@ -194,7 +195,7 @@ impl<'a> Session<'a> {
                 &Looked {
                     problem,
                     analysis: &analysis,
-                    estimate: &estimate,
+                    estimate: &estimate.errors,
                     scale: analysis.objective.map_or(f64::NAN, f64::abs),
                     evaluations: 0,
                     is_out_of_time: limit.is_over(),
@@ -216,7 +217,7 @@ impl<'a> Session<'a> {
         optimised: &Optimised,
         limit: &TimeLimit,
         observer: &mut dyn RunObserver,
-    ) -> Result<(Refined, Option<ErrorEstimate>), Error> {
+    ) -> Result<(Refined, Option<Estimate>), Error> {
         let reason = optimised.stop_reason;
         if let Some(setup) = levels.finer.take() {
             return Ok((Refined::Yes(setup), None));
@@ -247,7 +248,7 @@ impl<'a> Session<'a> {
             &Looked {
                 problem,
                 analysis,
-                estimate: &estimate,
+                estimate: &estimate.errors,
                 scale: optimised.initial.abs().max(optimised.best.objective.abs()),
                 evaluations: optimised.evaluations,
                 is_out_of_time: optimised.computed > 0 && limit.is_over(),

@@ -100,11 +100,12 @@ impl Session<'_> {
         let mut constraints = constraints(problem, analysis, &bounds);
         let estimate = self.estimator().estimate(analysis, observer);
         if let Some(estimate) = &estimate {
-            let at_initial = Some(estimate).filter(|_| has_initial_bounds);
-            enter_errors(&mut constraints, (problem, &bounds), (at_initial, estimate), observer);
+            let errors = &estimate.errors;
+            let at_initial = Some(errors).filter(|_| has_initial_bounds);
+            enter_errors(&mut constraints, (problem, &bounds), (at_initial, errors), observer);
         }
         if config.output.fields != FieldsKept::Nothing {
-            let error = estimate.as_ref().map(|estimate| estimate.by_element.as_slice());
+            let error = estimate.as_ref().map(|estimate| estimate.errors.by_element.as_slice());
             let error = error.filter(|by_element| !by_element.is_empty());
             write_field(&self.directory, self.pieces().as_ref(), 0, problem, (analysis, error))?;
             write_collection(&self.directory, &[0])?;
@@ -114,6 +115,8 @@ impl Session<'_> {
         exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
+        let of_states = estimate.as_ref().map(|estimate| estimate.of_states.clone()).unwrap_or_default();
+        let estimate = estimate.filter(|_| analysis.objective.is_some());
         let accuracy = (estimate.is_some() || self.is_geometry_looked_at()).then(|| {
             let objective = analysis.objective.filter(|_| self.has_field_objective());
             let shapes: Vec<(&Mesh, f64)> = objective.iter().map(|&value| (&analysis.mesh, value)).collect();
@@ -124,12 +127,12 @@ impl Session<'_> {
                 ..Accuracy::default()
             };
             match (objective, estimate) {
-                (Some(value), Some(estimate)) => Some(known.of_analysis(value, estimate.objective)),
+                (Some(value), Some(estimate)) => Some(known.of_analysis(value, estimate.errors.objective)),
                 _ => Some(known).filter(Accuracy::says_something_of_the_geometry),
             }
         });
         let accuracy = accuracy.flatten();
-        Ok(RunResult {
+        let mut result = RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
                 initial: value,
@@ -144,6 +147,8 @@ impl Session<'_> {
             accuracy,
             constraints,
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
-        })
+        };
+        result.enter_errors(&of_states);
+        Ok(result)
     }
 }

@@ -80,6 +80,7 @@ impl Session<'_> {
             probes,
             losses_w,
             forces,
+            errors: None,
             saturation,
             states: if states.len() > 1 { states } else { Vec::new() },
             initial: Vec::new(),

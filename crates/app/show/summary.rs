@@ -9,8 +9,8 @@ use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
     Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, MultipoleResult, ObjectiveResult,
-    RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateResult, Verdict, Verification,
-    VerificationMesh,
+    RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateErrors, StateResult, Verdict,
+    Verification, VerificationMesh,
 };
 use crate::printable::printable;
 
@@ -83,16 +83,20 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, named, styles)));
     let states = states(result);
     for (at, state) in &states {
-        let loss =
-            |(region, loss): (&String, &f64)| ("loss", format!("{loss:.6e} W in {}{at}", printable(region)));
+        let loss = |(region, loss): (&String, &f64)| {
+            let bar = bar(state.errors.and_then(|errors| errors.losses_w.get(region)), "W");
+            ("loss", format!("{loss:.6e} W in {}{at}{bar}", printable(region)))
+        };
         rows.extend(state.losses.iter().map(loss));
     }
     for (at, state) in &states {
         let vector = |[x, y, z]: [f64; 3]| format!("({x:.6e}, {y:.6e}, {z:.6e})");
         for BodyForce { name, force_n, torque_nm, .. } in state.forces {
             let on = format!("on {}{at}", printable(name));
-            rows.push(("force", format!("{} N {on}", vector(*force_n))));
-            rows.push(("torque", format!("{} N m {on}", vector(*torque_nm))));
+            let error = state.errors.and_then(|errors| errors.forces.get(name));
+            let bars = [bar(error.map(|own| &own.force_n), "N"), bar(error.map(|own| &own.torque_nm), "N m")];
+            rows.push(("force", format!("{} N {on}{}", vector(*force_n), bars[0])));
+            rows.push(("torque", format!("{} N m {on}{}", vector(*torque_nm), bars[1])));
         }
     }
     for (at, state) in &states {
@@ -101,11 +105,15 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         rows.push(("Newton steps", format!("{}{at}", saturation.newton_steps)));
     }
     if result.loads.is_empty() {
-        rows.extend(result.coils.iter().map(|coil| ("coil", coil_text(coil))));
+        let row = |coil| ("coil", coil_text(coil, result.errors.as_ref()));
+        rows.extend(result.coils.iter().map(row));
     }
     for state in result.states.iter().filter(|_| !result.loads.is_empty()) {
         let under = state.load.as_deref().map(|load| format!(" under {}", printable(load)));
-        let row = |coil| ("coil", format!("{}{}", coil_text(coil), under.as_deref().unwrap_or_default()));
+        let row = |coil| {
+            let text = coil_text(coil, state.errors.as_ref());
+            ("coil", format!("{text}{}", under.as_deref().unwrap_or_default()))
+        };
         rows.extend(state.coils.iter().map(row));
     }
     for set in &result.multipoles {
@@ -131,7 +139,12 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     rows.push(("peak memory", format!("{:.0} MiB", result.peak_memory_bytes as f64 / (1024.0 * 1024.0))));
     let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
     let rows = rows.into_iter().map(|(name, text)| format!("{name:<22} {text}"));
-    rows.chain(probes::lines(&result.probes, frequency)).collect()
+    rows.chain(probes::lines(&result.probes, result.errors.as_ref(), frequency)).collect()
+}
+
+/// The error bar of a value with an estimated error, behind it.
+fn bar(error: Option<&f64>, unit: &str) -> String {
+    error.map_or(String::new(), |error| format!(" ± {:.1e} {unit} (estimated)", SAFETY * error.abs()))
 }
 
 /// How far a region goes into its B–H curve.
@@ -233,16 +246,17 @@ fn expansion_text(set: &MultipoleResult) -> String {
 }
 
 /// What the terminals of a coil see.
-fn coil_text(coil: &CoilResult) -> String {
+fn coil_text(coil: &CoilResult, errors: Option<&StateErrors>) -> String {
     let text = |amplitude: Amplitude| match amplitude {
         Amplitude::Static(value) => format!("{value:.6e}"),
         Amplitude::Phasor([re, im]) => format!("({re:.6e} {im:+.6e}j)"),
     };
     format!(
-        "{}: {} A, {} Wb, {:.6e} ohm, {} V",
+        "{}: {} A, {} Wb{}, {:.6e} ohm, {} V",
         printable(&coil.name),
         text(coil.current_a),
         text(coil.flux_linkage_wb),
+        bar(errors.and_then(|errors| errors.flux_linkages_wb.get(&coil.name)), "Wb"),
         coil.resistance_ohm,
         text(coil.voltage_v)
     )
@@ -315,21 +329,23 @@ struct State<'a> {
     losses: &'a BTreeMap<String, f64>,
     forces: &'a [BodyForce],
     saturation: Option<&'a SaturationResult>,
+    errors: Option<&'a StateErrors>,
 }
 
 /// The states, with the words that tell each from the others.
 fn states(result: &RunResult) -> Vec<(String, State<'_>)> {
     if result.states.is_empty() {
-        let RunResult { losses_w: losses, forces, saturation, .. } = result;
-        return vec![(String::new(), State { losses, forces, saturation: saturation.as_ref() })];
+        let RunResult { losses_w: losses, forces, saturation, errors, .. } = result;
+        let (saturation, errors) = (saturation.as_ref(), errors.as_ref());
+        return vec![(String::new(), State { losses, forces, saturation, errors })];
     }
     let of = result.states.iter().map(|own| {
-        let StateResult { load, frequency_hz, losses_w: losses, forces, saturation, .. } = own;
+        let StateResult { load, frequency_hz, losses_w: losses, forces, saturation, errors, .. } = own;
         let at = match load {
             Some(load) => format!(" under {}", printable(load)),
             None => format!(" at {frequency_hz} Hz"),
         };
-        (at, State { losses, forces, saturation: saturation.as_ref() })
+        (at, State { losses, forces, saturation: saturation.as_ref(), errors: errors.as_ref() })
     });
     of.collect()
 }

@@ -81,14 +81,14 @@ pub(super) fn of_initial_design(
     if analysis.objective.is_some() && !is_of_field {
         notices.push("the objective is of the shape alone, and has no error of the field".to_owned());
     }
-    let constraints = estimated.iter().flat_map(|estimate| &estimate.constraints);
+    let constraints = estimated.iter().flat_map(|estimate| &estimate.errors.constraints);
     let constraints = constraints.map(|&(k, error)| ConstraintError {
         name: setup.problem.constraints()[k].name.clone(),
         value: analysis.constraints[k].value,
         error_estimate: error,
     });
     let constraints = constraints.collect();
-    let error = estimated.map(|estimate| estimate.objective).filter(|_| is_of_field);
+    let error = estimated.map(|estimate| estimate.errors.objective).filter(|_| is_of_field);
     let error_bar_relative =
         analysis.objective.zip(error).and_then(|(value, error)| relative_bar(error, value));
     Ok(EstimateSummary {

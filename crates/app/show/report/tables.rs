@@ -11,7 +11,7 @@ use super::ticks::{number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline, PermeabilityOf, skin_warnings};
 use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel};
-use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateResult, TermResult};
+use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateErrors, StateResult, TermResult};
 use crate::show::Evaluation;
 
 /// Rows of a table that is shown at once; a longer one is opened by the reader.
@@ -112,6 +112,7 @@ struct State<'a> {
     load: Option<&'a str>,
     losses: &'a BTreeMap<String, f64>,
     probes: &'a [ProbeResult],
+    errors: Option<&'a StateErrors>,
 }
 
 impl<'a> State<'a> {
@@ -121,7 +122,8 @@ impl<'a> State<'a> {
             let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
             let load = result.loads.first().map(String::as_str);
             let (losses, probes) = (&result.losses_w, result.probes.as_slice());
-            return vec![Self { words: words_of(load, frequency), frequency, load, losses, probes }];
+            let (words, errors) = (words_of(load, frequency), result.errors.as_ref());
+            return vec![Self { words, frequency, load, losses, probes, errors }];
         }
         let of = |state: &'a StateResult| Self {
             words: words_of(state.load.as_deref(), state.frequency_hz),
@@ -129,6 +131,7 @@ impl<'a> State<'a> {
             load: state.load.as_deref(),
             losses: &state.losses_w,
             probes: &state.probes,
+            errors: state.errors.as_ref(),
         };
         result.states.iter().map(of).collect()
     }
@@ -231,11 +234,12 @@ fn losses(result: &RunResult, states: &[State<'_>]) -> Markup {
     let row = |state: &State<'_>, (region, loss): (&String, &f64)| {
         let before = state.initial(result).and_then(|initial| initial.losses_w.get(region));
         let before = before.map_or(String::new(), |before| number(*before, 5));
-        vec![region.clone(), state.words.clone(), before, number(*loss, 5)]
+        let error = state.errors.and_then(|errors| errors.losses_w.get(region));
+        vec![region.clone(), state.words.clone(), before, number(*loss, 5), bar(error, 1.0)]
     };
     let rows: Vec<Vec<String>> =
         states.iter().flat_map(|state| state.losses.iter().map(|entry| row(state, entry))).collect();
-    let head = ["region", head_of_state(result), "initial [W]", "loss [W]"];
+    let head = ["region", head_of_state(result), "initial [W]", "loss [W]", "error bar (estimated)"];
     titled_table("Eddy-current losses of the part that is modelled", &head, &rows, MOST_ROWS)
 }
 
@@ -252,11 +256,17 @@ fn probes(result: &RunResult, states: &[State<'_>]) -> Markup {
         head_of_state(result),
         "initial |B| [mT]",
         "|B| [mT]",
+        "error bar (estimated)",
         "Bx [mT]",
         "By [mT]",
         "Bz [mT]",
     ];
     titled_table("Flux density at the probes, best design", &head, &rows, MOST_POINTS)
+}
+
+/// The error bar of a value with an estimated error, in a unit of which so many are one of SI.
+fn bar(error: Option<&f64>, factor: f64) -> String {
+    error.map_or(String::new(), |error| format!("± {}", number(factor * SAFETY * error.abs(), 2)))
 }
 
 fn hertz(frequency: f64) -> String {
@@ -284,10 +294,12 @@ fn rows_of(state: &State<'_>, probe: &ProbeResult, initial: Option<&ProbeResult>
         let millitesla = |size: Option<f64>| size.map_or(String::new(), |size| number(1e3 * size, 4));
         cells.push(millitesla(initial.and_then(|initial| magnitude(initial, k))));
         if let (Some(re), Some(im)) = (probe.b_re_t[k], probe.b_im_t[k]) {
+            let error = state.errors.and_then(|errors| errors.probes_t.get(&probe.name)?.get(k)?.as_ref());
             cells.push(millitesla(magnitude(probe, k)));
+            cells.push(bar(error, 1e3));
             cells.extend((0..3).map(|d| component(re[d], im[d])));
         } else {
-            cells.extend(["outside the moved mesh", "", "", ""].map(str::to_owned));
+            cells.extend(["outside the moved mesh", "", "", "", ""].map(str::to_owned));
         }
         cells
     };

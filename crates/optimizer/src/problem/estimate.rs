@@ -5,7 +5,7 @@
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::{ElementId, Mesh};
 use fluxmorph_solver::enrichment::{Effort, Enrichment};
-use fluxmorph_solver::{FieldModel, FunctionalValue};
+use fluxmorph_solver::{FieldModel, FieldSolution, FunctionalValue};
 
 use super::{Analysis, Problem};
 use crate::error::Error;
@@ -14,7 +14,7 @@ use crate::objective::Term;
 /// Estimated errors: what the true value has more than the computed one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ErrorEstimate {
-    /// Of the objective [its unit].
+    /// Of the objective [its unit]; zero without one.
     pub objective: f64,
     /// Of each constraint on a functional of the field, with its number.
     pub constraints: Vec<(usize, f64)>,
@@ -81,7 +81,8 @@ impl ErrorEstimate {
 }
 
 impl Problem {
-    /// The errors of an analysed design's values; `models` are those of this problem, as far as they are made.
+    /// The errors of an analysed design's values; `models` are those of this problem, as far as they are made. Each state of one
+    /// order more is shown to `look` with its number.
     ///
     /// # Errors
     /// [`fluxmorph_solver::SolverError::Parameter`] for second order and for several ranks; what a linear solver fails with.
@@ -89,8 +90,9 @@ impl Problem {
         &self,
         analysis: &Analysis,
         models: &mut EnrichedModels,
+        look: &mut dyn FnMut(usize, &FieldModel, &FieldSolution),
     ) -> Result<ErrorEstimate, Error> {
-        let groups = self.groups_of_terms();
+        let groups = if self.objective().is_some() { self.groups_of_terms() } else { Vec::new() };
         let mut errors = vec![0.0; groups.len()];
         let mut by_element = vec![vec![0.0; analysis.mesh.topology().tets().len()]; groups.len()];
         let mut estimate = ErrorEstimate {
@@ -115,7 +117,11 @@ impl Problem {
                 error.1 += state.error_of(&[term], None)?;
             }
             estimate.iterations += state.enriched.iterations();
+            look(index, state.enriched.model(), &state.enriched.state(1.0));
             before = Some(state.enriched);
+        }
+        if groups.is_empty() {
+            return Ok(estimate);
         }
         let (group, objective) = self.error_of_objective(analysis, &errors);
         // No mesh changes a term of the shape: the error that can be taken off is that of the term before.

@@ -83,6 +83,15 @@ fn mutual(
     Ok(coils.iter().map(|driven| unit.iter().map(|u| product(&driven.load, u)).collect()).collect())
 }
 
+/// Flux linkages [Wb] of the coils with windings in a state, with their names.
+pub fn flux_linkages(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<(String, c64)> {
+    let windings = model.windings();
+    let of = |(k, driven): (usize, &Driven)| {
+        (model.coils()[driven.coil].name.clone(), windings.linkage(k, model, mesh, solution))
+    };
+    windings.coils.iter().enumerate().map(of).collect()
+}
+
 /// What the terminals see of a state; solves for 1 A in each coil with the state's matrix.
 ///
 /// # Errors

@@ -1,0 +1,91 @@
+//! What a state reports beside the objective, and its errors by a field of one order more or on halved edges.
+//!
+//! The estimate of the objective has that field at hand; a second evaluation of losses, forces, flux linkages and probes on it costs
+//! next to nothing. Does not live here: the fields (`estimate`) and what is written of a state (`summary`).
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::locate::{Located, locate};
+use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_optimizer::body::{Body, BodyForce};
+use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_solver::circuit::flux_linkages;
+use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
+
+use crate::config::Config;
+use crate::files::{ForceError, StateErrors};
+
+/// Whether the states of a problem report anything beside the objective.
+pub(super) fn is_something(config: &Config, problem: &Problem) -> bool {
+    let has_losses = |model: &FieldModel| {
+        let conducts = model.materials().iter().any(|material| material.conductivity > 0.0);
+        model.angular_frequency() > 0.0 && (conducts || !model.conductors().is_empty())
+    };
+    let has_coils = config.coils.iter().any(|coil| coil.turns.is_some());
+    !config.probes.is_empty()
+        || !problem.bodies().is_empty()
+        || has_coils
+        || problem.states().iter().any(has_losses)
+}
+
+/// What a state reports, by names.
+pub(super) struct Reported {
+    losses: Vec<(String, f64)>,
+    flux_linkages: Vec<(String, c64)>,
+    forces: Vec<BodyForce>,
+    probes: Vec<(String, Vec<Option<[c64; 3]>>)>,
+}
+
+impl Reported {
+    /// That of a field.
+    pub(super) fn of(
+        (config, bodies): (&Config, &[Body]),
+        (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution),
+    ) -> Self {
+        let places: Vec<Point> = config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
+        let at = |(located, place): (Option<Located>, &Point)| {
+            let (e, _) = located?;
+            Some(recovery::recovered_flux_density(solution, model, mesh, e, *place))
+        };
+        let mut fields = locate(mesh, &places).into_iter().zip(&places).map(at);
+        let probe = |probe: &crate::config::Probe| {
+            (probe.name.clone(), fields.by_ref().take(probe.points.len()).collect())
+        };
+        Self {
+            probes: config.probes.iter().map(probe).collect(),
+            losses: solution.losses(model, mesh),
+            flux_linkages: flux_linkages(model, mesh, solution),
+            forces: bodies.iter().map(|body| body.force(model, mesh, solution)).collect(),
+        }
+    }
+
+    /// The errors, so many times what a better field has more; `None` where one is no number.
+    pub(super) fn errors(&self, better: &Self, times: f64) -> Option<StateErrors> {
+        let length = |a: &[c64], b: &[c64]| {
+            times * a.iter().zip(b).map(|(a, b)| (b - a).norm_sqr()).sum::<f64>().sqrt()
+        };
+        let loss =
+            |((name, own), (_, more)): (&(String, f64), &(String, f64))| (name.clone(), times * (more - own));
+        let linkage = |((name, own), (_, more)): (&(String, c64), &(String, c64))| {
+            (name.clone(), length(&[*own], &[*more]))
+        };
+        let force = |(own, more): (&BodyForce, &BodyForce)| {
+            let force_n = times * norm(sub(more.force_n, own.force_n));
+            let torque_nm = times * norm(sub(more.torque_nm, own.torque_nm));
+            (own.name.clone(), ForceError { force_n, torque_nm })
+        };
+        let probe = |((name, own), (_, more)): (&(String, Vec<_>), &(String, Vec<_>))| {
+            let at = |(own, more): (&Option<[c64; 3]>, &Option<[c64; 3]>)| {
+                Some(length(own.as_ref()?, more.as_ref()?))
+            };
+            (name.clone(), own.iter().zip(more).map(at).collect::<Vec<_>>())
+        };
+        let errors = StateErrors {
+            losses_w: self.losses.iter().zip(&better.losses).map(loss).collect(),
+            flux_linkages_wb: self.flux_linkages.iter().zip(&better.flux_linkages).map(linkage).collect(),
+            forces: self.forces.iter().zip(&better.forces).map(force).collect(),
+            probes_t: self.probes.iter().zip(&better.probes).map(probe).collect(),
+        };
+        errors.is_finite().then_some(errors)
+    }
+}
