@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::coils::COILS;
 use crate::support::device::{BLOCK, Device, shipped, written};
 use crate::support::essence::{assert_same, essence};
 use crate::support::folder::{RunFolder, count, files, number, read_json, scalars};
@@ -313,4 +314,52 @@ fn the_estimate_of_a_recovered_field_is_that_of_second_order() {
         println!("{other}: {before:e} {estimate:+e}, by second order {:+e}", after - before);
         assert!((estimate / (after - before) - 1.0).abs() < 0.01, "{estimate} {before} {after}");
     }
+}
+
+/// Losses, forces, flux linkages, expansions and probes have error bars that hold, without an objective, too: against second order on
+/// halved edges.
+#[test]
+fn what_a_result_reports_beside_an_objective_has_error_bars() {
+    let home = folder();
+    let (device, _) = COILS.split_once("[objective]").expect("what is optimised comes last");
+    let more = "[[probes]]\nname = \"axis\"\npoints = [[\"0 mm\", \"0 mm\", \"30 mm\"], [\"5 mm\", \"0 mm\", \"10 mm\"]]\n\n\
+                [[forces]]\nname = \"plate\"\nregions = [\"plate\"]\n";
+    let path = home.path().join("coils.toml");
+    std::fs::write(&path, format!("{device}{more}")).expect("written");
+    let solved = |name: &str, options: &[&str]| {
+        let out = home.path().join(name);
+        let done = finish(command(&[&"solve", &path, &"--out", &out]).args(options)).completed();
+        (read_json(&out.join("result.json")), done)
+    };
+    let (own, said) = solved("own", &[]);
+    let never = "accuracy.estimate=false";
+    let (better, _) = solved("better", &["--set", "analysis.order=2", "--refine", "1", "--set", never]);
+    assert!(own["accuracy"].is_null() && own["objective"].is_null() && better["errors"].is_null(), "{own}");
+    let length = |keys: &[String]| {
+        let of = |key: &String| number(&better, key) - number(&own, key);
+        keys.iter().map(of).map(|part| part * part).sum::<f64>().sqrt()
+    };
+    let parts = |key: &str, of: &[usize]| of.iter().map(|k| format!("{key}/{k}")).collect::<Vec<_>>();
+    let probe = |k: usize| {
+        let of = |part: &str| parts(&format!("/probes/0/{part}/{k}"), &[0, 1, 2]);
+        [of("b_re_t"), of("b_im_t")].concat()
+    };
+    let cases = [
+        ("/errors/losses_w/plate", vec!["/losses_w/plate".to_owned()]),
+        ("/errors/flux_linkages_wb/one", parts("/coils/0/flux_linkage_wb", &[0, 1])),
+        ("/errors/flux_linkages_wb/two", parts("/coils/1/flux_linkage_wb", &[0, 1])),
+        ("/errors/forces/plate/force_n", parts("/forces/0/force_n", &[0, 1, 2])),
+        ("/errors/forces/plate/torque_nm", parts("/forces/0/torque_nm", &[0, 1, 2])),
+        ("/errors/multipoles_t/ball/c0_0", parts("/multipoles/1/terms/0/value_t", &[0, 1])),
+        ("/errors/multipoles_t/ball/c1_0", parts("/multipoles/1/terms/1/value_t", &[0, 1])),
+        ("/errors/probes_t/axis/0", probe(0)),
+        ("/errors/probes_t/axis/1", probe(1)),
+    ];
+    for (key, values) in cases {
+        let (estimated, error) = (number(&own, key).abs(), length(&values));
+        println!("{key}: {estimated:.2e} for {error:.2e}");
+        assert!(error < 2.0 * estimated && estimated < 2.0 * error, "{key}: {estimated:e} for {error:e}");
+    }
+    let rows = ["W in plate ± ", "N on plate ± ", "Wb ± ", "± mT", "T ± "];
+    said.says(&rows);
 }

@@ -8,7 +8,7 @@ use crate::support::folder::{read_json, read_text};
 use crate::support::program::{Finished, fluxmorph, folder};
 use crate::support::{changed, with_mesh_file};
 
-const COILS: &str = include_str!("../support/coils.toml");
+pub(crate) const COILS: &str = include_str!("../support/coils.toml");
 
 /// A command on the coils with changes.
 fn execute(command: &str, folder: &Path, changes: &[(&str, &str)]) -> Finished {

@@ -45,6 +45,9 @@ pub struct StateErrors {
     /// Of forces [N] and torques [N m] on every body.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub forces: BTreeMap<String, ForceError>,
+    /// Of the terms of expansions [T], by the names of both.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub multipoles_t: BTreeMap<String, BTreeMap<String, f64>>,
     /// Of B at the points of probes [T]; `null` for a point that the moved mesh no longer holds.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub probes_t: BTreeMap<String, Vec<Option<f64>>>,
@@ -54,9 +57,10 @@ impl StateErrors {
     /// Whether all of them are numbers.
     pub fn is_finite(&self) -> bool {
         let forces = self.forces.values().flat_map(|own| [own.force_n, own.torque_nm]);
+        let terms = self.multipoles_t.values().flat_map(|terms| terms.values().copied());
         let probes = self.probes_t.values().flatten().flatten().copied();
         let others = self.losses_w.values().chain(self.flux_linkages_wb.values()).copied();
-        others.chain(forces).chain(probes).all(f64::is_finite)
+        others.chain(forces).chain(terms).chain(probes).all(f64::is_finite)
     }
 }
 

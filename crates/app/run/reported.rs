@@ -1,6 +1,6 @@
-//! What a state reports beside the objective, and its errors by a field of one order more or on halved edges.
+//! What a state reports beside the objective, and its errors: what a field of one order more has more of it, or one on halved edges.
 //!
-//! The estimate of the objective has that field at hand; a second evaluation of losses, forces, flux linkages and probes on it costs
+//! The estimate of the objective has that field at hand; a second evaluation of losses, forces, flux linkages, expansions and probes on it costs
 //! next to nothing. Does not live here: the fields (`estimate`) and what is written of a state (`summary`).
 
 use fluxmorph_geometry::Mesh;
@@ -10,9 +10,11 @@ use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_optimizer::body::{Body, BodyForce};
 use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::circuit::flux_linkages;
+use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
 
-use crate::config::Config;
+use crate::build::multipole;
+use crate::config::{Config, MultipoleSet};
 use crate::files::{ForceError, StateErrors};
 
 /// Whether the states of a problem report anything beside the objective.
@@ -25,6 +27,7 @@ pub(super) fn is_something(config: &Config, problem: &Problem) -> bool {
     !config.probes.is_empty()
         || !problem.bodies().is_empty()
         || has_coils
+        || !config.multipoles.is_empty()
         || problem.states().iter().any(has_losses)
 }
 
@@ -33,6 +36,7 @@ pub(super) struct Reported {
     losses: Vec<(String, f64)>,
     flux_linkages: Vec<(String, c64)>,
     forces: Vec<BodyForce>,
+    expansions: Vec<(String, Vec<(Harmonic, c64)>)>,
     probes: Vec<(String, Vec<Option<[c64; 3]>>)>,
 }
 
@@ -51,7 +55,12 @@ impl Reported {
         let probe = |probe: &crate::config::Probe| {
             (probe.name.clone(), fields.by_ref().take(probe.points.len()).collect())
         };
+        let expansion = |set: &MultipoleSet| {
+            let multipoles = multipole::multipoles(config, set, mesh, model).ok()?;
+            Some((set.name.clone(), multipoles.coefficients(model, mesh, solution).ok()?))
+        };
         Self {
+            expansions: config.multipoles.iter().filter_map(expansion).collect(),
             probes: config.probes.iter().map(probe).collect(),
             losses: solution.losses(model, mesh),
             flux_linkages: flux_linkages(model, mesh, solution),
@@ -80,7 +89,14 @@ impl Reported {
             };
             (name.clone(), own.iter().zip(more).map(at).collect::<Vec<_>>())
         };
+        let expansion = |((name, own), (_, more)): (&(String, Vec<_>), &(String, Vec<_>))| {
+            let term = |((term, own), (_, more)): (&(Harmonic, c64), &(Harmonic, c64))| {
+                (term.to_string(), length(&[*own], &[*more]))
+            };
+            (name.clone(), own.iter().zip(more).map(term).collect())
+        };
         let errors = StateErrors {
+            multipoles_t: self.expansions.iter().zip(&better.expansions).map(expansion).collect(),
             losses_w: self.losses.iter().zip(&better.losses).map(loss).collect(),
             flux_linkages_wb: self.flux_linkages.iter().zip(&better.flux_linkages).map(linkage).collect(),
             forces: self.forces.iter().zip(&better.forces).map(force).collect(),

@@ -117,7 +117,7 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         rows.extend(state.coils.iter().map(row));
     }
     for set in &result.multipoles {
-        rows.push(("expansion", expansion_text(set)));
+        rows.push(("expansion", expansion_text(set, result.errors.as_ref())));
     }
     if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
         rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
@@ -231,14 +231,19 @@ fn constraints_text(found: &Verification, styles: &Styles) -> String {
 }
 
 /// The terms of an expansion, most of them relative to its main order.
-fn expansion_text(set: &MultipoleResult) -> String {
+fn expansion_text(set: &MultipoleResult, errors: Option<&StateErrors>) -> String {
+    let errors = errors.and_then(|errors| errors.multipoles_t.get(&set.name));
     let term = |term: &HarmonicResult| {
         let value = match term.value_t {
             Amplitude::Static(value) => value,
             Amplitude::Phasor([re, im]) => re.hypot(im),
         };
         let units = term.units.map_or(String::new(), |units| format!(" ({units:.2} units)"));
-        format!("{} {value:.4e} T{units}", term.name)
+        let bar = match errors.and_then(|errors| errors.get(&term.name)) {
+            Some(error) => format!(" ± {:.1e}", SAFETY * error),
+            None => String::new(),
+        };
+        format!("{} {value:.4e}{bar} T{units}", term.name)
     };
     let shown: Vec<String> = set.terms.iter().take(MOST_TERMS).map(term).collect();
     let more = if set.terms.len() > MOST_TERMS { ", and more in result.json" } else { "" };

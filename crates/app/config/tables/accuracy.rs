@@ -31,8 +31,9 @@ table! {
     /// max_refinements = 6
     /// ```
     pub struct Accuracy: Default {
-        /// Whether the error of the objective that comes from the mesh is estimated: by `solve`, and by `run` at the first and
-        /// the best design, unless `output.verify_refinement` is 0. In one process. Default: an estimate is made for elements of first
+        /// Whether the errors that come from the mesh are estimated, of the objective and of losses, forces, flux linkages,
+        /// expansions and probes: by `solve`, and by `run` at the first and the best design, unless `output.verify_refinement` is 0. In
+        /// one process. Default: an estimate is made for elements of first
         /// order, and given up where it would cost more than three evaluations and more than two seconds (along a B–H curve: than
         /// each step of Newton's method may). `true`: it is made whatever it costs, and for elements of second order too, on eight
         /// times as many. With B–H curves there is one at 0 Hz alone.
