@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
+use serde_json::Value;
+
 use crate::coils::COILS;
+use crate::support::changed;
 use crate::support::device::{BLOCK, Device, shipped, written};
 use crate::support::essence::{assert_same, essence};
 use crate::support::folder::{RunFolder, count, files, number, read_json, scalars};
@@ -316,12 +319,13 @@ fn the_estimate_of_a_recovered_field_is_that_of_second_order() {
     }
 }
 
-/// Losses, forces, flux linkages, expansions and probes have error bars that hold, without an objective, too: against second order on
-/// halved edges.
+/// Losses, forces, flux linkages, expansions and probes have error bars that hold, of every state and without an objective, too:
+/// against second order on halved edges, and of second order by these.
 #[test]
 fn what_a_result_reports_beside_an_objective_has_error_bars() {
     let home = folder();
     let (device, _) = COILS.split_once("[objective]").expect("what is optimised comes last");
+    let device = changed(device, &[("frequency = \"200 Hz\"", "frequencies = [\"200 Hz\", \"300 Hz\"]")]);
     let more = "[[probes]]\nname = \"axis\"\npoints = [[\"0 mm\", \"0 mm\", \"30 mm\"], [\"5 mm\", \"0 mm\", \"10 mm\"]]\n\n\
                 [[forces]]\nname = \"plate\"\nregions = [\"plate\"]\n";
     let path = home.path().join("coils.toml");
@@ -331,35 +335,62 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
         let done = finish(command(&[&"solve", &path, &"--out", &out]).args(options)).completed();
         (read_json(&out.join("result.json")), done)
     };
-    let (own, said) = solved("own", &[]);
-    let never = "accuracy.estimate=false";
-    let (better, _) = solved("better", &["--set", "analysis.order=2", "--refine", "1", "--set", never]);
-    assert!(own["accuracy"].is_null() && own["objective"].is_null() && better["errors"].is_null(), "{own}");
-    let length = |keys: &[String]| {
-        let of = |key: &String| number(&better, key) - number(&own, key);
-        keys.iter().map(of).map(|part| part * part).sum::<f64>().sqrt()
-    };
+    let second = ["--set", "analysis.order=2", "--set"];
+    let [never, always] = ["accuracy.estimate=false", "accuracy.estimate=true"];
+    let (first, said) = solved("first", &[]);
+    let (halved, _) = solved("halved", &[&second[..], &[never, "--refine", "1"]].concat());
+    let (on_the_mesh, _) = solved("second", &[&second[..], &[always]].concat());
+    assert!(
+        first["accuracy"].is_null() && first["objective"].is_null() && halved["errors"].is_null(),
+        "{first}"
+    );
+    assert_eq!(first["errors"], first["states"][0]["errors"]);
     let parts = |key: &str, of: &[usize]| of.iter().map(|k| format!("{key}/{k}")).collect::<Vec<_>>();
     let probe = |k: usize| {
         let of = |part: &str| parts(&format!("/probes/0/{part}/{k}"), &[0, 1, 2]);
         [of("b_re_t"), of("b_im_t")].concat()
     };
     let cases = [
-        ("/errors/losses_w/plate", vec!["/losses_w/plate".to_owned()]),
-        ("/errors/flux_linkages_wb/one", parts("/coils/0/flux_linkage_wb", &[0, 1])),
-        ("/errors/flux_linkages_wb/two", parts("/coils/1/flux_linkage_wb", &[0, 1])),
-        ("/errors/forces/plate/force_n", parts("/forces/0/force_n", &[0, 1, 2])),
-        ("/errors/forces/plate/torque_nm", parts("/forces/0/torque_nm", &[0, 1, 2])),
-        ("/errors/multipoles_t/ball/c0_0", parts("/multipoles/1/terms/0/value_t", &[0, 1])),
-        ("/errors/multipoles_t/ball/c1_0", parts("/multipoles/1/terms/1/value_t", &[0, 1])),
-        ("/errors/probes_t/axis/0", probe(0)),
-        ("/errors/probes_t/axis/1", probe(1)),
+        ("losses_w/plate", vec!["/losses_w/plate".to_owned()]),
+        ("flux_linkages_wb/one", parts("/coils/0/flux_linkage_wb", &[0, 1])),
+        ("flux_linkages_wb/two", parts("/coils/1/flux_linkage_wb", &[0, 1])),
+        ("forces/plate/force_n", parts("/forces/0/force_n", &[0, 1, 2])),
+        ("forces/plate/torque_nm", parts("/forces/0/torque_nm", &[0, 1, 2])),
+        ("multipoles_t/ball/c0_0", parts("/multipoles/1/terms/0/value_t", &[0, 1])),
+        ("multipoles_t/ball/c1_0", parts("/multipoles/1/terms/1/value_t", &[0, 1])),
+        ("probes_t/axis/0", probe(0)),
+        ("probes_t/axis/1", probe(1)),
     ];
-    for (key, values) in cases {
-        let (estimated, error) = (number(&own, key).abs(), length(&values));
-        println!("{key}: {estimated:.2e} for {error:.2e}");
+    for (state, (key, values)) in (0..2).flat_map(|state| cases.iter().map(move |case| (state, case))) {
+        let number = |of: &Value, key: &str| number(&of["states"][state], key);
+        let difference = |own: &Value| {
+            let of = |key: &String| number(&halved, key) - number(own, key);
+            values.iter().map(of).map(|part| part * part).sum::<f64>().sqrt()
+        };
+        let key = format!("/errors/{key}");
+        let (estimated, error) = (number(&first, &key).abs(), difference(&first));
+        println!("state {state}, {key}: {estimated:.2e} for {error:.2e}");
         assert!(error < 2.0 * estimated && estimated < 2.0 * error, "{key}: {estimated:e} for {error:e}");
+        // The other mesh is the one that these errors are of, with a third of its change more.
+        let (estimated, change) = (number(&on_the_mesh, &key).abs(), difference(&on_the_mesh));
+        assert!((0.75 * estimated / change - 1.0).abs() < 1e-4, "{key}: {estimated:e} for {change:e}");
     }
-    let rows = ["W in plate ± ", "N on plate ± ", "Wb ± ", "± mT", "T ± "];
-    said.says(&rows);
+    said.says(&["W in plate at 200 Hz ± ", "N on plate at 300 Hz ± ", "Wb ± ", "± mT", "T ± "]);
+}
+
+/// A copper plate with sharp edges behind an impedance surface; the one of steel has hardly more than its surface.
+#[test]
+fn a_conductor_that_has_more_loss_than_its_surface_is_named() {
+    let home = folder();
+    let said = |name: &str, sets: &[&str]| {
+        let device = sets.iter().fold(shipped("shield_quick", &[]), |device, set| device.with(set));
+        finish(&mut device.command("solve", &home.path().join(name))).completed().stderr
+    };
+    let copper =
+        said("copper", &["materials.steel.relative_permeability=1", "materials.steel.conductivity=5.8e7"]);
+    assert!(
+        copper.contains("% more loss at 60 Hz than its impedance surface, mostly at its sharp edges"),
+        "{copper}"
+    );
+    assert!(!said("steel", &[]).contains("its impedance surface"));
 }

@@ -40,7 +40,9 @@ fn is_asked_for(config: &Config) -> bool {
 /// Bytes that the process holds at the peak of an estimate, about; `None` where none is wanted.
 pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
     let is_second_order = config.analysis.order == ElementOrder::Quadratic;
-    let is_of_something = problem.objective().is_some() || reported::is_something(config, problem);
+    let has_bound = problem.constraints().iter().any(|own| own.quantity.is_of_field());
+    let is_of_something =
+        problem.objective().is_some() || has_bound || reported::is_something(config, problem);
     let is_wanted = config.accuracy.estimate != Some(false) && is_of_something;
     if !is_wanted || problem.share().is_some() || is_second_order && !is_asked_for(config) {
         return None;
@@ -120,11 +122,12 @@ impl<'a> Estimator<'a> {
         let (config, problem, mesh) = (self.config, self.problem, &analysis.mesh);
         let of_run = (config, problem.bodies());
         let mut of_states = vec![None; problem.states().len()];
-        let mut look = |index: usize, model: &FieldModel, solution: &FieldSolution| {
+        let mut inspect = |index: usize, model: &FieldModel, solution: &FieldSolution| {
             let own = Reported::of(of_run, (&problem.states()[index], mesh, &analysis.solutions[index]));
-            of_states[index] = own.errors(&Reported::of(of_run, (model, mesh, solution)), 1.0);
+            let better = Reported::of(of_run, (model, mesh, solution));
+            of_states[index] = own.zip(better).and_then(|(own, better)| own.errors(&better, 1.0));
         };
-        let errors = problem.estimate_error(analysis, &mut self.models, &mut look)?;
+        let errors = problem.estimate_error(analysis, &mut self.models, &mut inspect)?;
         Ok(Estimate { errors, of_states })
     }
 
@@ -157,7 +160,7 @@ impl<'a> Estimator<'a> {
             by_element: Vec::new(),
             iterations: found.linear_iterations,
         };
-        let reported = |problem: &Problem, analysis: &Analysis| -> Vec<Reported> {
+        let reported = |problem: &Problem, analysis: &Analysis| -> Vec<Option<Reported>> {
             let states = problem.states().iter().zip(&analysis.solutions);
             let of = |(model, solution)| {
                 Reported::of((self.config, problem.bodies()), (model, &analysis.mesh, solution))
@@ -165,7 +168,8 @@ impl<'a> Estimator<'a> {
             states.map(of).collect()
         };
         let pairs = reported(problem, analysis).into_iter().zip(reported(&finer.setup.problem, &found));
-        let of_states = pairs.map(|(own, better)| own.errors(&better, OF_HALVED_EDGES)).collect();
+        let errors_of = |(own, better): (Reported, Reported)| own.errors(&better, OF_HALVED_EDGES);
+        let of_states = pairs.map(|(own, better)| own.zip(better).and_then(errors_of)).collect();
         Ok(Estimate { errors, of_states })
     }
 }

@@ -34,10 +34,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use confirmation::ShapeMeshes;
+use estimate::Estimate;
 use facets::FirstFacets;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use journal::{Identity, Journal};
 use mesh_independence::{Check, FreshMesh, MeshIndependence};
@@ -242,15 +244,8 @@ impl Session<'_> {
         result.warnings.splice(0..0, optimised.warnings.clone());
         self.keep_search(&mut result, observer)?;
         let errors = self.estimate_errors(first, (best, reason), at_best, observer);
-        if let Some([at_initial, at_best]) = &errors {
-            let of_run = (&self.setup.problem, &optimised.bounds[..]);
-            let of_both = (Some(&at_initial.errors), &at_best.errors);
-            enter_errors(&mut result.constraints, of_run, of_both, observer);
-            result.enter_errors(&at_best.of_states);
-            let at_best = &at_best.errors;
-            if at_best.by_element.iter().any(|error| *error != 0.0) {
-                recorder.write_error(&self.setup.problem, &best.analysis, &at_best.by_element)?;
-            }
+        if let Some(errors) = &errors {
+            self.enter_estimates(&mut result, &optimised, (errors, &mut recorder), observer)?;
         }
         let errors = errors.map(|errors| errors.map(|estimate| estimate.errors.objective));
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
@@ -260,6 +255,25 @@ impl Session<'_> {
         // The ranks' part of the problem goes with it.
         drop(recorder);
         self.confirm(result, (&shapes, &meshes), (errors, refinements.as_ref()), observer)
+    }
+
+    /// Enters the estimated errors at the initial and the best design, and writes where those of the best one are made.
+    fn enter_estimates(
+        &self,
+        result: &mut RunResult,
+        optimised: &Optimised,
+        ([at_initial, at_best], recorder): (&[Estimate; 2], &mut DirectoryRecorder),
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), Error> {
+        let of_run = (&self.setup.problem, &optimised.bounds[..]);
+        let of_both = (Some(&at_initial.errors), &at_best.errors);
+        enter_errors(&mut result.constraints, of_run, of_both, observer);
+        result.enter_errors(&at_best.of_states);
+        let by_element = &at_best.errors.by_element;
+        if by_element.iter().any(|error| *error != 0.0) {
+            recorder.write_error(&self.setup.problem, &optimised.best.analysis, by_element)?;
+        }
+        Ok(())
     }
 
     /// Does the work, writes the result, and completes the manifest whatever happens, be it a panic.

@@ -14,7 +14,8 @@ use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
 
 use crate::build::multipole;
-use crate::config::{Config, MultipoleSet};
+use crate::config::{Config, MultipoleSet, Probe};
+use crate::error::Error;
 use crate::files::{ForceError, StateErrors};
 
 /// Whether the states of a problem report anything beside the objective.
@@ -36,36 +37,60 @@ pub(super) struct Reported {
     losses: Vec<(String, f64)>,
     flux_linkages: Vec<(String, c64)>,
     forces: Vec<BodyForce>,
-    expansions: Vec<(String, Vec<(Harmonic, c64)>)>,
-    probes: Vec<(String, Vec<Option<[c64; 3]>>)>,
+    expansions: Vec<(String, Terms)>,
+    probes: Vec<(String, AtPoints)>,
+}
+
+/// B at the points of a probe [T]; `None` outside the mesh.
+pub(super) type AtPoints = Vec<Option<[c64; 3]>>;
+
+/// The terms of an expansion [T].
+pub(super) type Terms = Vec<(Harmonic, c64)>;
+
+/// B at the points of probes [T], of which each has an entry in `located`; `None` outside the mesh.
+pub(super) fn probes(
+    config: &Config,
+    located: &[Option<Located>],
+    (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution),
+) -> Vec<(String, AtPoints)> {
+    let mut located = located.iter();
+    let mut of_probe = |probe: &Probe| {
+        let at = |(place, located): (&Point, &Option<Located>)| {
+            let (e, _) = (*located)?;
+            Some(recovery::recovered_flux_density(solution, model, mesh, e, *place))
+        };
+        (probe.name.clone(), probe.points.iter().zip(located.by_ref()).map(at).collect())
+    };
+    config.probes.iter().map(&mut of_probe).collect()
+}
+
+/// The terms of every expansion.
+pub(super) fn expansions(
+    config: &Config,
+    (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution),
+) -> Result<Vec<(String, Terms)>, Error> {
+    let of = |set: &MultipoleSet| {
+        let multipoles = multipole::multipoles(config, set, mesh, model)?;
+        Ok((set.name.clone(), multipoles.coefficients(model, mesh, solution)?))
+    };
+    config.multipoles.iter().map(of).collect()
 }
 
 impl Reported {
-    /// That of a field.
+    /// That of a field; `None` where an expansion cannot be had of it.
     pub(super) fn of(
         (config, bodies): (&Config, &[Body]),
         (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution),
-    ) -> Self {
-        let places: Vec<Point> = config.probes.iter().flat_map(|probe| &probe.points).copied().collect();
-        let at = |(located, place): (Option<Located>, &Point)| {
-            let (e, _) = located?;
-            Some(recovery::recovered_flux_density(solution, model, mesh, e, *place))
-        };
-        let mut fields = locate(mesh, &places).into_iter().zip(&places).map(at);
-        let probe = |probe: &crate::config::Probe| {
-            (probe.name.clone(), fields.by_ref().take(probe.points.len()).collect())
-        };
-        let expansion = |set: &MultipoleSet| {
-            let multipoles = multipole::multipoles(config, set, mesh, model).ok()?;
-            Some((set.name.clone(), multipoles.coefficients(model, mesh, solution).ok()?))
-        };
-        Self {
-            expansions: config.multipoles.iter().filter_map(expansion).collect(),
-            probes: config.probes.iter().map(probe).collect(),
+    ) -> Option<Self> {
+        let points = config.probes.iter().flat_map(|probe| &probe.points).copied().collect::<Vec<Point>>();
+        let expansions = expansions(config, (model, mesh, solution)).ok()?;
+        Some(Self {
             losses: solution.losses(model, mesh),
             flux_linkages: flux_linkages(model, mesh, solution),
             forces: bodies.iter().map(|body| body.force(model, mesh, solution)).collect(),
-        }
+            expansions,
+            probes: probes(config, &locate(mesh, &points), (model, mesh, solution)),
+        })
     }
 
     /// The errors, so many times what a better field has more; `None` where one is no number.

@@ -1,6 +1,5 @@
-//! What the field of a design says against the model it was computed with: iron beyond saturation with a linear law, skins
-//! that the mesh or the impedance surface of that design does not carry, losses that impedance
-//! surfaces leave out.
+//! What the field of a design says against the model it was computed with: iron beyond saturation with a linear law, skins that the
+//! mesh or the impedance surface of that design does not carry, losses that impedance surfaces leave out.
 //!
 //! `check` cannot know it. It is said at the end of a run or an analysis, and kept in `result.json`.
 
@@ -9,7 +8,7 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, Mesh, Readable, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_solver::audit::{LeftOut, left_out, weighted_median};
+use fluxmorph_solver::audit::{ExcessLoss, excess_losses, weighted_median};
 use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
@@ -25,7 +24,7 @@ use crate::files::ObjectiveResult;
 const SATURATION: f64 = 2.0;
 
 /// Share of the loss of an impedance surface that may be left out without a word.
-const LEFT_OUT: f64 = 0.01;
+const UNSAID_EXCESS: f64 = 0.01;
 
 /// Share of a region's volume that must lie beyond it: elements at re-entrant corners have a field that grows with refinement.
 const TOLERATED_SHARE: f64 = 1e-3;
@@ -57,7 +56,7 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
     all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
-    all.extend(left_out_of_losses(problem, analysis));
+    all.extend(excess_of_conductors(problem, analysis));
     let least = problem
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
@@ -105,17 +104,17 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
 }
 
 /// What impedance surfaces leave out of losses, of each where that is the largest share.
-fn left_out_of_losses(problem: &Problem, analysis: &Analysis) -> Vec<String> {
-    let mut worst: BTreeMap<String, (LeftOut, &FieldModel)> = BTreeMap::new();
+fn excess_of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
+    let mut worst: BTreeMap<String, (ExcessLoss, &FieldModel)> = BTreeMap::new();
     for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
-        for found in left_out(model, &analysis.mesh, solution) {
-            let largest = worst.get(&found.region).map_or(LEFT_OUT, |(own, _)| own.share().abs());
+        for found in excess_losses(model, &analysis.mesh, solution) {
+            let largest = worst.get(&found.region).map_or(UNSAID_EXCESS, |(own, _)| own.share().abs());
             if found.share().abs() > largest {
                 worst.insert(found.region.clone(), (found, model));
             }
         }
     }
-    let text = |(found, model): &(LeftOut, &FieldModel)| {
+    let text = |(found, model): &(ExcessLoss, &FieldModel)| {
         let load = model.setup().load_case.as_ref();
         let more = if found.share() > 0.0 { "more" } else { "less" };
         let (why, cure) = if found.at_edges.abs() > found.of_curvature.abs() {

@@ -5,6 +5,7 @@ use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
 use fluxmorph_remesh::Moved;
 
+use super::estimate::Estimate;
 use super::finer::{Cut, FinerProblem};
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
@@ -115,23 +116,7 @@ impl Session<'_> {
         exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
-        let of_states = estimate.as_ref().map(|estimate| estimate.of_states.clone()).unwrap_or_default();
-        let estimate = estimate.filter(|_| analysis.objective.is_some());
-        let accuracy = (estimate.is_some() || self.is_geometry_looked_at()).then(|| {
-            let objective = analysis.objective.filter(|_| self.has_field_objective());
-            let shapes: Vec<(&Mesh, f64)> = objective.iter().map(|&value| (&analysis.mesh, value)).collect();
-            let known = Accuracy {
-                refinements: halvings as usize,
-                facets: self.facets_of(None, &shapes, observer),
-                near_wall: self.near_wall_noted(observer),
-                ..Accuracy::default()
-            };
-            match (objective, estimate) {
-                (Some(value), Some(estimate)) => Some(known.of_analysis(value, estimate.errors.objective)),
-                _ => Some(known).filter(Accuracy::says_something_of_the_geometry),
-            }
-        });
-        let accuracy = accuracy.flatten();
+        let accuracy = self.accuracy_of(analysis, halvings, estimate.as_ref(), observer);
         let mut result = RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
@@ -148,7 +133,35 @@ impl Session<'_> {
             constraints,
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         };
-        result.enter_errors(&of_states);
+        if let Some(estimate) = estimate {
+            result.enter_errors(&estimate.of_states);
+        }
         Ok(result)
+    }
+
+    /// What is known of how exact the objective of an analysis is.
+    fn accuracy_of(
+        &self,
+        analysis: &Analysis,
+        halvings: u32,
+        estimate: Option<&Estimate>,
+        observer: &mut dyn RunObserver,
+    ) -> Option<Accuracy> {
+        let estimate = estimate.filter(|_| analysis.objective.is_some());
+        if estimate.is_none() && !self.is_geometry_looked_at() {
+            return None;
+        }
+        let objective = analysis.objective.filter(|_| self.has_field_objective());
+        let shapes: Vec<(&Mesh, f64)> = objective.iter().map(|&value| (&analysis.mesh, value)).collect();
+        let known = Accuracy {
+            refinements: halvings as usize,
+            facets: self.facets_of(None, &shapes, observer),
+            near_wall: self.near_wall_noted(observer),
+            ..Accuracy::default()
+        };
+        match (objective, estimate) {
+            (Some(value), Some(estimate)) => Some(known.of_analysis(value, estimate.errors.objective)),
+            _ => Some(known).filter(Accuracy::says_something_of_the_geometry),
+        }
     }
 }

@@ -15,10 +15,11 @@ use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
 use fluxmorph_solver::linear::Method;
 use fluxmorph_solver::multipole::Harmonic;
-use fluxmorph_solver::{FieldModel, FieldSolution, Functional, PointsOf, SolverError, recovery, saturation};
+use fluxmorph_solver::{FieldModel, FieldSolution, Functional, PointsOf, SolverError, saturation};
 
 use super::Session;
 use super::confirmation::InitialField;
+use super::reported::{self, AtPoints, Terms};
 use super::reservations::reservations;
 use crate::build::multipole;
 use crate::config;
@@ -121,10 +122,8 @@ impl Session<'_> {
         analysis: &Analysis,
         solution: &FieldSolution,
     ) -> Result<Vec<MultipoleResult>, Error> {
-        let mesh = &analysis.mesh;
-        let of = |set: &config::MultipoleSet| {
-            let multipoles = multipole::multipoles(self.config, set, mesh, model)?;
-            let coefficients = multipoles.coefficients(model, mesh, solution)?;
+        let found = reported::expansions(self.config, (model, &analysis.mesh, solution))?;
+        let of = |(set, (name, coefficients)): (&config::MultipoleSet, (String, Terms))| {
             let main = multipole::main_terms(set);
             let of_main = coefficients.iter().filter(|(term, _)| main.contains(term));
             let reference = of_main.map(|(_, c)| c.norm_sqr()).sum::<f64>().sqrt();
@@ -133,10 +132,9 @@ impl Session<'_> {
                 value_t: amplitude(*c, model.angular_frequency()),
                 units: (reference > 0.0).then(|| 1e4 * c.norm() / reference),
             };
-            let terms = coefficients.iter().map(term).collect();
-            Ok(MultipoleResult { name: set.name.clone(), radius_m: set.radius, terms })
+            MultipoleResult { name, radius_m: set.radius, terms: coefficients.iter().map(term).collect() }
         };
-        self.config.multipoles.iter().map(of).collect()
+        Ok(self.config.multipoles.iter().zip(found).map(of).collect())
     }
 
     /// Seconds of every stage.
@@ -204,34 +202,23 @@ impl Session<'_> {
     ) -> StateResult {
         let (model, solution) = (&self.setup.problem.states()[index], &analysis.solutions[index]);
         let mesh = &analysis.mesh;
-        let mut located = located.iter();
-        let probes = self
-            .config
-            .probes
-            .iter()
-            .map(|probe| {
-                let mut at = |&point| match located.next().copied().flatten() {
-                    Some((e, _)) => Some(recovery::recovered_flux_density(solution, model, mesh, e, point)),
-                    // It was inside before the mesh moved: the result of a whole run is worth more than this point.
-                    None => {
-                        if index == 0 {
-                            let ([lower, upper], wanted_by) =
-                                (mesh.bounding_box(), PointsOf::Probe(probe.name.clone()));
-                            let error = SolverError::PointOutside { wanted_by, point, lower, upper };
-                            observer.warning(&format!("{error}: its field is left out"));
-                        }
-                        None
-                    }
-                };
-                let b: Vec<_> = probe.points.iter().map(&mut at).collect();
-                ProbeResult {
-                    name: probe.name.clone(),
-                    points_m: probe.points.clone(),
-                    b_re_t: b.iter().map(|b| b.map(|b| b.map(|c| c.re))).collect(),
-                    b_im_t: b.iter().map(|b| b.map(|b| b.map(|c| c.im))).collect(),
-                }
-            })
-            .collect();
+        let places =
+            self.config.probes.iter().flat_map(|probe| probe.points.iter().map(move |p| (probe, *p)));
+        for ((probe, point), _) in places.zip(located).filter(|(_, located)| index == 0 && located.is_none())
+        {
+            // It was inside before the mesh moved: the result of a whole run is worth more than this point.
+            let ([lower, upper], wanted_by) = (mesh.bounding_box(), PointsOf::Probe(probe.name.clone()));
+            let error = SolverError::PointOutside { wanted_by, point, lower, upper };
+            observer.warning(&format!("{error}: its field is left out"));
+        }
+        let found = reported::probes(self.config, located, (model, mesh, solution)).into_iter();
+        let probe = |(probe, (name, b)): (&config::Probe, (String, AtPoints))| ProbeResult {
+            name,
+            points_m: probe.points.clone(),
+            b_re_t: b.iter().map(|b| b.map(|b| b.map(|c| c.re))).collect(),
+            b_im_t: b.iter().map(|b| b.map(|b| b.map(|c| c.im))).collect(),
+        };
+        let probes = self.config.probes.iter().zip(found).map(probe).collect();
         StateResult {
             load: model.setup().load_case.clone(),
             frequency_hz: model.setup().frequency,

@@ -37,7 +37,7 @@ pub(super) fn lines(probes: &[ProbeResult], errors: Option<&StateErrors>, freque
             let [x, y, z] = point.map(|c| (c * 1e6).round() / 1e3 + 0.0);
             let at = format!("  ({x}, {y}, {z}) mm");
             let bar = |k: usize| match errors.and_then(|errors| *errors.get(k)?) {
-                Some(error) => format!("{:>10.4}", SAFETY * error * scale),
+                Some(error) => format!("{:>10.1e}", SAFETY * error * scale),
                 None => String::new(),
             };
             let values = match field(probe, k) {
@@ -96,7 +96,7 @@ mod tests {
             ..StateErrors::default()
         };
         let lines = lines(&[probe(2, 0.0)], Some(&errors), 0.0);
-        assert!(lines[0].ends_with("± mT") && lines[1].ends_with("    0.2000"), "{lines:?}");
+        assert!(lines[0].ends_with("± mT") && lines[1].ends_with("    2.0e-1"), "{lines:?}");
         assert!(lines[2].ends_with(" 3.0000"), "{lines:?}");
     }
 }

@@ -5,9 +5,8 @@
 //! Basic theory of magnets, CERN 98-05). In a ball of air any component is harmonic: along the axis
 //! `B = Σ (ρ/r)^n P_nm(cos θ) (c_nm cos mφ + s_nm sin mφ)` with associated Legendre functions without normalisation or phase
 //! (Roméo and Hoult, Magn. Reson. Med. 1 (1984) 44), in [T] at the radius `r`. Both are linear in B at points: the trapezoidal
-//! rule around the axis, that of Gauss along it, with as many points as keep fields of [`UNDISTURBED`] orders above those that are asked
-//! for apart: of a pair of coils a ball of half their radius had a `c2_0` of a twelfth of its field, which has none, from a rule of the
-//! terms' own degree.
+//! rule around the axis, that of Gauss along it, with as many points as keep terms of fifteen orders above those that are asked for
+//! apart from these.
 //! Lives here: points and weights. Does not live here: the field at them ([`crate::recovery`]), functions of the coefficients
 //! ([`crate::functional`]).
 
@@ -143,7 +142,7 @@ impl Domain {
 impl Expansion {
     /// `b_1, a_1 … b_N, a_N` on the circle of a radius [m] around the axis of a frame.
     pub fn circle(frame: &Frame, radius: f64, order: usize) -> Self {
-        // n and n' are one at these points where n + n' is their number.
+        // Orders n and n' are taken for each other where n + n' is the number of points.
         let count = 4 * (order + 1).max((2 * order + UNDISTURBED).div_ceil(4));
         let angles: Vec<f64> = (0..count).map(|k| 2.0 * PI * (k as f64 + 0.5) / count as f64).collect();
         let points = angles.iter().map(|a| place(frame, radius, [a.cos(), a.sin(), 0.0])).collect();

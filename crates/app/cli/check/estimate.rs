@@ -71,8 +71,9 @@ pub(super) fn of_initial_design(
     let (cache, stages) = (&mut SolverCache::default(), &mut Watching(observer));
     let analysis = setup.problem.analyse(moved, Derivatives::None, cache, stages)?;
     let mut listening = Listening { observer, notices: Vec::new() };
-    let estimated = Estimator::new((&config, source), (&setup.problem, &setup.full_mesh))
-        .estimate(&analysis, &mut listening);
+    let is_shown = analysis.objective.is_some() || !analysis.constraints.is_empty();
+    let mut estimator = Estimator::new((&config, source), (&setup.problem, &setup.full_mesh));
+    let estimated = is_shown.then(|| estimator.estimate(&analysis, &mut listening)).flatten();
     let mut notices = listening.notices;
     if analysis.objective.is_none() {
         notices.push("there is no [objective] whose error could be estimated".to_owned());

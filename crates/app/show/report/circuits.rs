@@ -3,55 +3,57 @@
 use maud::{Markup, html};
 
 use super::iron::under;
-use super::tables::{MOST_ROWS, titled_table};
+use super::tables::{ERROR_BAR, MOST_ROWS, bar, titled_table};
 use super::ticks::number;
-use crate::files::{Amplitude, CoilResult, MultipoleResult, RunResult};
+use crate::files::{Amplitude, CoilResult, MultipoleResult, RunResult, StateErrors};
 
 /// Terminals, inductances and coupling of coils; terms of expansions. Under several loads all but the inductances for each.
 pub(super) fn circuits(result: &RunResult) -> Markup {
     let states = &result.states;
     html! {
         @if result.loads.len() > 1 {
-            @for state in states { (terminals(&state.coils, state.load.as_deref())) }
+            @for state in states { (terminals(&state.coils, state.errors.as_ref(), state.load.as_deref())) }
         } @else {
-            (terminals(&result.coils, None))
+            (terminals(&result.coils, result.errors.as_ref(), None))
         }
         (matrix("Inductances [H]", &result.inductance_h, result))
         @if result.coils.len() > 1 { (matrix("Coupling", &result.coupling, result)) }
         @if result.loads.len() > 1 {
-            @for state in states { (expansions(&state.multipoles, state.load.as_deref())) }
+            @for state in states { (expansions(&state.multipoles, state.errors.as_ref(), state.load.as_deref())) }
         } @else {
-            (expansions(&result.multipoles, None))
+            (expansions(&result.multipoles, result.errors.as_ref(), None))
         }
     }
 }
 
 /// What the terminals of coils see.
-fn terminals(coils: &[CoilResult], load: Option<&str>) -> Markup {
+fn terminals(coils: &[CoilResult], errors: Option<&StateErrors>, load: Option<&str>) -> Markup {
     let row = |coil: &CoilResult| {
         vec![
             coil.name.clone(),
             amplitude(coil.current_a, "A"),
             amplitude(coil.flux_linkage_wb, "Wb"),
+            bar(errors.and_then(|errors| errors.flux_linkages_wb.get(&coil.name)), 1.0),
             format!("{} Ω", number(coil.resistance_ohm, 5)),
             amplitude(coil.voltage_v, "V"),
         ]
     };
     let rows: Vec<Vec<String>> = coils.iter().map(row).collect();
-    let head = ["coil", "current", "flux linkage", "resistance", "voltage"];
+    let head = ["coil", "current", "flux linkage", ERROR_BAR, "resistance", "voltage"];
     titled_table(&format!("Coils of the meshed part{}", under(load)), &head, &rows, MOST_ROWS)
 }
 
 /// The terms of expansions.
-fn expansions(sets: &[MultipoleResult], load: Option<&str>) -> Markup {
+fn expansions(sets: &[MultipoleResult], errors: Option<&StateErrors>, load: Option<&str>) -> Markup {
     html! {
         @for set in sets {
             (titled_table(
                 &format!("Expansion {}, at {} mm{}", set.name, number(1e3 * set.radius_m, 4), under(load)),
-                &["term", "value", "units of 1e-4"],
+                &["term", "value", ERROR_BAR, "units of 1e-4"],
                 &set.terms.iter().map(|term| {
                     let units = term.units.map_or(String::new(), |units| number(units, 5));
-                    vec![term.name.clone(), amplitude(term.value_t, "T"), units]
+                    let error = errors.and_then(|errors| errors.multipoles_t.get(&set.name)?.get(&term.name));
+                    vec![term.name.clone(), amplitude(term.value_t, "T"), bar(error, 1.0), units]
                 }).collect::<Vec<_>>(),
                 MOST_ROWS,
             ))

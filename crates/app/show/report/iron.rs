@@ -12,10 +12,11 @@ use super::field_cut::{CutTriangle, FieldCut};
 use super::markup::{Card, note, table};
 use super::picture::Picture;
 use super::plot::path;
+use super::tables::{ERROR_BAR, bar};
 use super::ticks::{Count, number, trim_zeros};
 use super::window::Window;
 use crate::build::Outline;
-use crate::files::{SaturatedRegion, SaturationResult};
+use crate::files::{SaturatedRegion, SaturationResult, StateErrors};
 
 /// Forces of at most so many bodies have a card.
 const MOST_CARDS: usize = 2;
@@ -43,13 +44,21 @@ pub(super) fn cards(data: &RunData) -> Vec<Card> {
 }
 
 /// Forces and torques on every body; nothing where there are none.
-pub(super) fn forces(forces: &[BodyForce], load: Option<&str>) -> Markup {
+pub(super) fn forces(forces: &[BodyForce], errors: Option<&StateErrors>, load: Option<&str>) -> Markup {
     let row = |body: &BodyForce| {
-        let numbers = body.force_n.iter().chain(&body.torque_nm).map(|v| number(*v, 5));
-        [body.name.clone()].into_iter().chain(numbers).collect()
+        let own = errors.and_then(|errors| errors.forces.get(&body.name));
+        let bars = [own.map(|own| &own.force_n), own.map(|own| &own.torque_nm)].map(|error| bar(error, 1.0));
+        let numbers = |vector: &[f64; 3]| vector.map(|v| number(v, 5));
+        let mut row = vec![body.name.clone()];
+        for (vector, bar) in [&body.force_n, &body.torque_nm].into_iter().zip(bars) {
+            row.extend(numbers(vector));
+            row.push(bar);
+        }
+        row
     };
     let rows: Vec<Vec<String>> = forces.iter().map(row).collect();
-    let head = ["body", "Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"];
+    let head =
+        ["body", "Fx [N]", "Fy [N]", "Fz [N]", ERROR_BAR, "Mx [N m]", "My [N m]", "Mz [N m]", ERROR_BAR];
     html! {
         @if !rows.is_empty() {
             h3 { "Forces and torques on the part that is modelled" (under(load)) }

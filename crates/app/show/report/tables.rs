@@ -14,6 +14,9 @@ use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateErrors, StateResult, TermResult};
 use crate::show::Evaluation;
 
+/// Head of a column of error bars, in the unit of the column before.
+pub(super) const ERROR_BAR: &str = "error bar (estimated)";
+
 /// Rows of a table that is shown at once; a longer one is opened by the reader.
 const SHOWN: usize = 12;
 
@@ -165,11 +168,11 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
         (losses(result, &states))
         @if result.loads.len() > 1 {
             @for state in &result.states {
-                (iron::forces(&state.forces, state.load.as_deref()))
+                (iron::forces(&state.forces, state.errors.as_ref(), state.load.as_deref()))
                 (iron::saturation(state.saturation.as_ref(), state.load.as_deref()))
             }
         } @else {
-            (iron::forces(&result.forces, None))
+            (iron::forces(&result.forces, result.errors.as_ref(), None))
             (iron::saturation(result.saturation.as_ref(), None))
         }
         (probes(result, &states))
@@ -186,7 +189,7 @@ fn constraints(results: &[ConstraintResult], constraints: &[Constraint]) -> Mark
         vec![c.name.clone(), value, bar.unwrap_or_default(), bound, verdict.to_owned()]
     };
     let rows: Vec<Vec<String>> = results.iter().map(row).collect();
-    let head = ["constraint", "value", "error bar (estimated)", "bound", ""];
+    let head = ["constraint", "value", ERROR_BAR, "bound", ""];
     titled_table("Constraints at the best design", &head, &rows, MOST_ROWS)
 }
 
@@ -239,7 +242,7 @@ fn losses(result: &RunResult, states: &[State<'_>]) -> Markup {
     };
     let rows: Vec<Vec<String>> =
         states.iter().flat_map(|state| state.losses.iter().map(|entry| row(state, entry))).collect();
-    let head = ["region", head_of_state(result), "initial [W]", "loss [W]", "error bar (estimated)"];
+    let head = ["region", head_of_state(result), "initial [W]", "loss [W]", ERROR_BAR];
     titled_table("Eddy-current losses of the part that is modelled", &head, &rows, MOST_ROWS)
 }
 
@@ -256,7 +259,7 @@ fn probes(result: &RunResult, states: &[State<'_>]) -> Markup {
         head_of_state(result),
         "initial |B| [mT]",
         "|B| [mT]",
-        "error bar (estimated)",
+        ERROR_BAR,
         "Bx [mT]",
         "By [mT]",
         "Bz [mT]",
@@ -264,8 +267,8 @@ fn probes(result: &RunResult, states: &[State<'_>]) -> Markup {
     titled_table("Flux density at the probes, best design", &head, &rows, MOST_POINTS)
 }
 
-/// The error bar of a value with an estimated error, in a unit of which so many are one of SI.
-fn bar(error: Option<&f64>, factor: f64) -> String {
+/// The error bar of a value with an estimated error, in a unit of which so many are one of SI; empty where none is known.
+pub(super) fn bar(error: Option<&f64>, factor: f64) -> String {
     error.map_or(String::new(), |error| format!("± {}", number(factor * SAFETY * error.abs(), 2)))
 }
 

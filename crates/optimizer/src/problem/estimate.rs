@@ -90,7 +90,7 @@ impl Problem {
         &self,
         analysis: &Analysis,
         models: &mut EnrichedModels,
-        look: &mut dyn FnMut(usize, &FieldModel, &FieldSolution),
+        inspect: &mut dyn FnMut(usize, &FieldModel, &FieldSolution),
     ) -> Result<ErrorEstimate, Error> {
         let groups = if self.objective().is_some() { self.groups_of_terms() } else { Vec::new() };
         let mut errors = vec![0.0; groups.len()];
@@ -117,7 +117,7 @@ impl Problem {
                 error.1 += state.error_of(&[term], None)?;
             }
             estimate.iterations += state.enriched.iterations();
-            look(index, state.enriched.model(), &state.enriched.state(1.0));
+            inspect(index, state.enriched.model(), &state.enriched.state(1.0));
             before = Some(state.enriched);
         }
         if groups.is_empty() {

@@ -9,7 +9,7 @@ mod half_space;
 mod layers;
 mod nodal;
 
-pub use half_space::{LeftOut, left_out};
+pub use half_space::{ExcessLoss, excess_losses};
 pub use layers::CoarseLayers;
 pub use nodal::NodalErrors;
 
