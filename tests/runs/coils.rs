@@ -138,7 +138,7 @@ fn the_current_at_a_voltage_can_be_made_small() {
 #[test]
 fn multipoles_are_those_of_a_fit_of_probes() {
     let (order, radius, height) = (4, 8e-3, 30e-3);
-    let count = 4 * (order + 1);
+    let count = 2 * order + 16;
     let angles = (0..count).map(|k| 2.0 * std::f64::consts::PI * (f64::from(k) + 0.5) / f64::from(count));
     // Angles from y towards z; the other half is the image in y = 0, where B_y is odd.
     let points: Vec<(f64, [f64; 2])> =
