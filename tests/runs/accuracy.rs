@@ -325,7 +325,9 @@ fn the_estimate_of_a_recovered_field_is_that_of_second_order() {
 fn what_a_result_reports_beside_an_objective_has_error_bars() {
     let home = folder();
     let (device, _) = COILS.split_once("[objective]").expect("what is optimised comes last");
-    let device = changed(device, &[("frequency = \"200 Hz\"", "frequencies = [\"200 Hz\", \"300 Hz\"]")]);
+    let frequencies = ("frequency = \"200 Hz\"", "frequencies = [\"200 Hz\", \"300 Hz\"]");
+    // Finer where the field is expanded.
+    let device = changed(device, &[("growth = 2", "growth = 1.4"), frequencies]);
     let more = "[[probes]]\nname = \"axis\"\npoints = [[\"0 mm\", \"0 mm\", \"30 mm\"], [\"5 mm\", \"0 mm\", \"10 mm\"]]\n\n\
                 [[forces]]\nname = \"plate\"\nregions = [\"plate\"]\n";
     let path = home.path().join("coils.toml");
