@@ -326,12 +326,17 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
     let home = folder();
     let (device, _) = COILS.split_once("[objective]").expect("what is optimised comes last");
     let frequencies = ("frequency = \"200 Hz\"", "frequencies = [\"200 Hz\", \"300 Hz\"]");
-    // Finer where the field is expanded.
-    let device = changed(device, &[("growth = 2", "growth = 1.4"), frequencies]);
+    // Cells as small as the ball asks for.
+    let aperture = "[[mesh.boxes.regions]]\nname = \"aperture\"\n\
+                    box = [[\"0 mm\", \"0 mm\", \"24 mm\"], [\"8 mm\", \"8 mm\", \"36 mm\"]]\n\
+                    size = [\"4 mm\", \"4 mm\", \"4 mm\"]\n\n[[mesh.boxes.surfaces]]";
+    let device = changed(device, &[("[[mesh.boxes.surfaces]]", aperture), frequencies]);
     let more = "[[probes]]\nname = \"axis\"\npoints = [[\"0 mm\", \"0 mm\", \"30 mm\"], [\"5 mm\", \"0 mm\", \"10 mm\"]]\n\n\
                 [[forces]]\nname = \"plate\"\nregions = [\"plate\"]\n";
     let path = home.path().join("coils.toml");
     std::fs::write(&path, format!("{device}{more}")).expect("written");
+    let checked = fluxmorph(&[&"check", &path]).completed().stdout;
+    assert!(checked.contains("ball: ball of 6 mm at (0, 0, 30) mm, up to order 3"), "{checked}");
     let solved = |name: &str, options: &[&str]| {
         let out = home.path().join(name);
         let done = finish(command(&[&"solve", &path, &"--out", &out]).args(options)).completed();
