@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::fem::scalar::axpy;
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
-use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, Readable};
 
 use crate::circuit::Excitation;
 use crate::elements::{ElementFamily, Order};
@@ -41,8 +41,8 @@ const TOLERANCE: f64 = 1e-3;
 /// Relative residual above which a correction is none.
 const REQUIRED: f64 = 1e-2;
 
-/// Iterations after which the corrections are given up. A dozen or two are usual.
-const MOST_ITERATIONS: usize = 300;
+/// Iterations after which the corrections are given up, and where they may take any effort. A dozen or two are usual.
+const MOST_ITERATIONS: [usize; 2] = [300, 3000];
 
 /// Evaluations that the iterations of an affordable estimate may cost.
 const MOST_EVALUATIONS: f64 = 3.0;
@@ -122,10 +122,11 @@ impl FieldModel {
             return Err(refuse("order", "2", "first order: there is no third one to estimate an error from"));
         }
         if !self.is_linear() && self.angular_frequency() > 0.0 {
+            let frequency = format!("{} Hz", Readable(self.setup().frequency));
             return Err(refuse(
-                "bh",
-                "a curve",
-                "statics: with a frequency the tangent is none of the field alone",
+                "frequency",
+                &frequency,
+                "0 Hz beside a B–H curve, along which no error is estimated above it",
             ));
         }
         if self.has_reentrant_walls() {
@@ -150,7 +151,7 @@ impl FieldModel {
             method: LinearSolver::Fixed(Method::TwoLevel),
             tolerance: TOLERANCE,
             required: REQUIRED,
-            max_iterations: Some(MOST_ITERATIONS),
+            max_iterations: Some(MOST_ITERATIONS[usize::from(effort == Effort::Any)]),
             // No fallback: a factor of second order would cost more than the estimate is worth.
             factor_bytes: 0,
             reuse: Reuse::Never,
