@@ -382,7 +382,13 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
         let (estimated, change) = (number(&on_the_mesh, &key).abs(), difference(&on_the_mesh));
         assert!((0.75 * estimated / change - 1.0).abs() < 1e-4, "{key}: {estimated:e} for {change:e}");
     }
-    said.says(&["W in plate at 200 Hz ± ", "N on plate at 300 Hz ± ", "Wb ± ", "± mT", "T ± "]);
+    said.says(&[
+        "W in plate at 200 Hz ± ",
+        "N on plate at 300 Hz ± ",
+        "Wb ± ",
+        "± mT",
+        "e-5 T (10000.00 units)",
+    ]);
 }
 
 /// A copper plate with sharp edges behind an impedance surface; the one of steel has hardly more than its surface.
