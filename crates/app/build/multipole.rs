@@ -1,6 +1,6 @@
 //! Expansions of a configuration on its mesh and states.
 
-use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::{Mesh, millimetres};
 use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::coil::Frame;
@@ -96,17 +96,15 @@ fn expansion(set: &MultipoleSet) -> Result<Expansion, Error> {
 pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) -> Result<(), Error> {
     let (mesh, states) = (problem.original(), problem.states());
     let mut sink = DiagnosticSink::new(config, source, Vec::new());
-    let [low, high] = mesh.bounding_box();
-    let is_within = |place: &Point| (0..3).all(|d| (low[d]..=high[d]).contains(&place[d]));
+    let bounds = AxisBox::around(&mesh.bounding_box());
     for (k, set) in config.multipoles.iter().enumerate() {
         let planes = planes(config, set, mesh)?;
         let disturbed = Multipoles::disturbance(states, mesh, &expansion(set)?, &planes);
         // Beyond the box of the mesh it is no hole.
-        let disturbed = disturbed.filter(|(place, _)| is_within(place));
-        if disturbed.is_none() {
+        let Some((place, what)) = disturbed.filter(|(place, _)| bounds.contains(*place)) else {
             sink.take(multipoles(config, set, mesh, &states[0]))?;
-        }
-        let Some((place, what)) = disturbed else { continue };
+            continue;
+        };
         let (shape, expected) = match set.shape {
             ExpansionShape::Circle => ("circle", "a circle in air, on which B is that of sources beside it"),
             ExpansionShape::Ball => {

@@ -9,7 +9,7 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::driver::Best;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem};
+use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, Problem};
 use fluxmorph_remesh::Moved;
 
 use super::Session;
@@ -76,7 +76,7 @@ impl Session<'_> {
         (best, stop_reason): (&Best, StopReason),
         at_best: Option<Estimate>,
         observer: &mut dyn Observer,
-    ) -> Option<[Estimate; 2]> {
+    ) -> Option<(ErrorEstimate, Estimate)> {
         let is_wanted =
             self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
         let is_of_field = self.has_field_objective()
@@ -87,10 +87,10 @@ impl Session<'_> {
         let (best, mut estimator) = (&best.analysis, self.estimator());
         let at_best = at_best.or_else(|| estimator.estimate(best, observer))?;
         if best.mesh.points() == initial.mesh().points() {
-            return Some([at_best.clone(), at_best]);
+            return Some((at_best.errors.clone(), at_best));
         }
         match initial.analysis(&self.setup.problem, best) {
-            Ok(initial) => Some([estimator.estimate(&initial, observer)?, at_best]),
+            Ok(initial) => Some((estimator.errors(&initial, observer)?, at_best)),
             // It was solved when the search began: what fails now costs the estimate, not the run.
             Err(error) => left_out(error, observer),
         }

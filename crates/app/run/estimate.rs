@@ -67,6 +67,15 @@ pub(crate) struct Estimate {
     pub(crate) of_states: Vec<Option<StateErrors>>,
 }
 
+/// What errors are estimated of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Of {
+    /// Objective and constraints.
+    Objective,
+    /// What the states report, too.
+    States,
+}
+
 /// Estimates the errors of analyses of one problem; what does not depend on the design is set up once.
 pub(crate) struct Estimator<'a> {
     config: &'a Config,
@@ -93,15 +102,28 @@ impl<'a> Estimator<'a> {
 
     /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
     pub(crate) fn estimate(&mut self, analysis: &Analysis, observer: &mut dyn Observer) -> Option<Estimate> {
+        self.estimated(Of::States, analysis, observer)
+    }
+
+    /// Those of objective and constraints alone.
+    pub(crate) fn errors(
+        &mut self,
+        analysis: &Analysis,
+        observer: &mut dyn Observer,
+    ) -> Option<ErrorEstimate> {
+        Some(self.estimated(Of::Objective, analysis, observer)?.errors)
+    }
+
+    fn estimated(&mut self, of: Of, analysis: &Analysis, observer: &mut dyn Observer) -> Option<Estimate> {
         if let Some(shortage) = memory_limit::shortage(memory(self.config, self.problem)?) {
             observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
             return None;
         }
         observer.phase("estimating the error of the mesh");
         let estimated = if self.config.analysis.order == ElementOrder::Quadratic {
-            self.on_halved_edges(analysis)
+            self.on_halved_edges(of, analysis)
         } else {
-            self.by_order(analysis)
+            self.by_order(of, analysis)
         };
         match estimated {
             Ok(estimate) => Some(estimate),
@@ -118,11 +140,14 @@ impl<'a> Estimator<'a> {
     }
 
     /// Of first order, by one order more.
-    fn by_order(&mut self, analysis: &Analysis) -> Result<Estimate, Error> {
+    fn by_order(&mut self, of: Of, analysis: &Analysis) -> Result<Estimate, Error> {
         let (config, problem, mesh) = (self.config, self.problem, &analysis.mesh);
         let of_run = (config, problem.bodies());
         let mut of_states = vec![None; problem.states().len()];
         let mut inspect = |index: usize, model: &FieldModel, solution: &FieldSolution| {
+            if of == Of::Objective {
+                return;
+            }
             let own = Reported::of(of_run, (&problem.states()[index], mesh, &analysis.solutions[index]));
             let better = Reported::of(of_run, (model, mesh, solution));
             of_states[index] = own.zip(better).and_then(|(own, better)| own.errors(&better, 1.0));
@@ -132,7 +157,7 @@ impl<'a> Estimator<'a> {
     }
 
     /// Of second order, without the places where the error is made.
-    fn on_halved_edges(&mut self, analysis: &Analysis) -> Result<Estimate, Error> {
+    fn on_halved_edges(&mut self, of: Of, analysis: &Analysis) -> Result<Estimate, Error> {
         let finer = match self.finer.take() {
             Some(finer) => finer,
             None => {
@@ -160,6 +185,9 @@ impl<'a> Estimator<'a> {
             by_element: Vec::new(),
             iterations: found.linear_iterations,
         };
+        if of == Of::Objective {
+            return Ok(Estimate { errors, of_states: Vec::new() });
+        }
         let reported = |problem: &Problem, analysis: &Analysis| -> Vec<Option<Reported>> {
             let states = problem.states().iter().zip(&analysis.solutions);
             let of = |(model, solution)| {

@@ -19,7 +19,7 @@ use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Problem};
 
 use super::Session;
-use super::estimate::{Estimate, Estimator};
+use super::estimate::Estimator;
 use super::journal::mesh_hash;
 use crate::build::{Mode, RefinedMesh, Setup, memory_limit, remaining_elements, set_up_on};
 use crate::config::{Config, SourceMap};
@@ -135,15 +135,9 @@ impl<'a> Levels<'a> {
         format!("the error bar of the {design} design is {bar}, accuracy.tolerance {tolerance}")
     }
 
-    /// The estimated errors of a design on the mesh as it is; `None` where there are none, for which the reason is reported.
-    pub(super) fn estimate(
-        &self,
-        problem: &Problem,
-        analysis: &Analysis,
-        observer: &mut dyn Observer,
-    ) -> Option<Estimate> {
-        let of_problem = (problem, self.mesh.mesh());
-        Estimator::new((self.config, self.source), of_problem).estimate(analysis, observer)
+    /// What estimates the errors of designs on the mesh as it is.
+    pub(super) fn estimator<'b>(&'b self, problem: &'b Problem) -> Estimator<'b> {
+        Estimator::new((self.config, self.source), (problem, self.mesh.mesh()))
     }
 
     /// Refines the mesh where a design needs it; whether it was refined. Why not is reported.
@@ -297,12 +291,12 @@ impl Supervisor for Levels<'_> {
         if before.is_some_and(|[_, best]| best == best_evaluation) {
             return Ok(None);
         }
-        let Some(estimate) = self.estimate(problem, best, observer) else { return Ok(None) };
+        let Some(errors) = self.estimator(problem).errors(best, observer) else { return Ok(None) };
         let refined = self.refine(
             &Looked {
                 problem,
                 analysis: best,
-                estimate: &estimate.errors,
+                estimate: &errors,
                 scale: initial.abs().max(best.objective.map_or(0.0, f64::abs)),
                 evaluations,
                 is_out_of_time: deadline.is_some_and(|deadline| Instant::now() >= deadline),

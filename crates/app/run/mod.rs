@@ -41,6 +41,7 @@ use fluxmorph_geometry::parallel::{RankGroup, Role};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::memory_estimate::Sizes;
+use fluxmorph_optimizer::problem::ErrorEstimate;
 use journal::{Identity, Journal};
 use mesh_independence::{Check, FreshMesh, MeshIndependence};
 use pieces::SharedPieces;
@@ -244,10 +245,11 @@ impl Session<'_> {
         result.warnings.splice(0..0, optimised.warnings.clone());
         self.keep_search(&mut result, observer)?;
         let errors = self.estimate_errors(first, (best, reason), at_best, observer);
-        if let Some(errors) = &errors {
-            self.enter_estimates(&mut result, &optimised, (errors, &mut recorder), observer)?;
+        if let Some((at_initial, at_best)) = &errors {
+            let errors = (at_initial, at_best);
+            self.enter_estimates(&mut result, (&optimised, errors), &mut recorder, observer)?;
         }
-        let errors = errors.map(|errors| errors.map(|estimate| estimate.errors.objective));
+        let errors = errors.map(|(at_initial, at_best)| [at_initial.objective, at_best.errors.objective]);
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         let members = [optimised.initial_members.clone(), best.analysis.member_values()];
         let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved, members };
@@ -261,12 +263,12 @@ impl Session<'_> {
     fn enter_estimates(
         &self,
         result: &mut RunResult,
-        optimised: &Optimised,
-        ([at_initial, at_best], recorder): (&[Estimate; 2], &mut DirectoryRecorder),
+        (optimised, (at_initial, at_best)): (&Optimised, (&ErrorEstimate, &Estimate)),
+        recorder: &mut DirectoryRecorder,
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
         let of_run = (&self.setup.problem, &optimised.bounds[..]);
-        let of_both = (Some(&at_initial.errors), &at_best.errors);
+        let of_both = (Some(at_initial), &at_best.errors);
         enter_errors(&mut result.constraints, of_run, of_both, observer);
         result.enter_errors(&at_best.of_states);
         let by_element = &at_best.errors.by_element;

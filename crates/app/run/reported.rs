@@ -1,7 +1,7 @@
 //! What a state reports beside the objective, and its errors: what a field of one order more has more of it, or one on halved edges.
 //!
-//! The estimate of the objective has that field at hand; a second evaluation of losses, forces, flux linkages, expansions and probes on it costs
-//! next to nothing. Does not live here: the fields (`estimate`) and what is written of a state (`summary`).
+//! The estimate of the objective has that field at hand; a second evaluation of losses, forces, flux linkages, expansions and probes
+//! on it costs next to nothing. Does not live here: the fields (`estimate`) and what is written of a state (`summary`).
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
@@ -41,6 +41,9 @@ pub(super) struct Reported {
     probes: Vec<(String, AtPoints)>,
 }
 
+/// A field with its model and its mesh.
+type Field<'a> = (&'a FieldModel, &'a Mesh, &'a FieldSolution);
+
 /// B at the points of a probe [T]; `None` outside the mesh.
 pub(super) type AtPoints = Vec<Option<[c64; 3]>>;
 
@@ -51,7 +54,7 @@ pub(super) type Terms = Vec<(Harmonic, c64)>;
 pub(super) fn probes(
     config: &Config,
     located: &[Option<Located>],
-    (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution),
+    (model, mesh, solution): Field<'_>,
 ) -> Vec<(String, AtPoints)> {
     let mut located = located.iter();
     let mut of_probe = |probe: &Probe| {
@@ -67,7 +70,7 @@ pub(super) fn probes(
 /// The terms of every expansion.
 pub(super) fn expansions(
     config: &Config,
-    (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution),
+    (model, mesh, solution): Field<'_>,
 ) -> Result<Vec<(String, Terms)>, Error> {
     let of = |set: &MultipoleSet| {
         let multipoles = multipole::multipoles(config, set, mesh, model)?;
@@ -80,7 +83,7 @@ impl Reported {
     /// That of a field; `None` where an expansion cannot be had of it.
     pub(super) fn of(
         (config, bodies): (&Config, &[Body]),
-        (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution),
+        (model, mesh, solution): Field<'_>,
     ) -> Option<Self> {
         let points = config.probes.iter().flat_map(|probe| &probe.points).copied().collect::<Vec<Point>>();
         let expansions = expansions(config, (model, mesh, solution)).ok()?;

@@ -81,8 +81,7 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
     states
         .flat_map(|(model, solution)| {
             let frequency = model.setup().frequency;
-            let load = model.setup().load_case.as_ref();
-            let under = load.map_or(String::new(), |load| format!(" under the load `{load}`"));
+            let under = under(model);
             let beyond = saturated(config, model, solution, analysis);
             beyond.into_iter().map(move |(region, found)| {
                 let under = &under;
@@ -103,6 +102,11 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
         .collect()
 }
 
+/// The load of a state, behind what is said of it.
+fn under(model: &FieldModel) -> String {
+    model.setup().load_case.as_ref().map_or(String::new(), |load| format!(" under the load `{load}`"))
+}
+
 /// What impedance surfaces leave out of losses, of each where that is the largest share.
 fn excess_of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
     let mut worst: BTreeMap<String, (ExcessLoss, &FieldModel)> = BTreeMap::new();
@@ -115,7 +119,6 @@ fn excess_of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
         }
     }
     let text = |(found, model): &(ExcessLoss, &FieldModel)| {
-        let load = model.setup().load_case.as_ref();
         let more = if found.share() > 0.0 { "more" } else { "less" };
         let (why, cure) = if found.at_edges.abs() > found.of_curvature.abs() {
             ("at its sharp edges", ", or mesh its edges round")
@@ -128,7 +131,7 @@ fn excess_of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
             found.region,
             100.0 * found.share().abs(),
             Readable(model.setup().frequency),
-            load.map_or(String::new(), |load| format!(" under the load `{load}`")),
+            under(model),
         )
     };
     worst.values().map(text).collect()

@@ -187,7 +187,7 @@ impl<'a> Session<'a> {
             let (moved, cache) = (problem.moved(self.initial_design())?, &mut SolverCache::default());
             let analysis = problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?;
             self.check_interrupted()?;
-            let Some(estimate) = levels.estimate(problem, &analysis, observer) else {
+            let Some(errors) = levels.estimator(problem).errors(&analysis, observer) else {
                 observer.warning("without an estimated error the mesh is not refined to accuracy.tolerance");
                 return Ok(());
             };
@@ -195,7 +195,7 @@ impl<'a> Session<'a> {
                 &Looked {
                     problem,
                     analysis: &analysis,
-                    estimate: &estimate.errors,
+                    estimate: &errors,
                     scale: analysis.objective.map_or(f64::NAN, f64::abs),
                     evaluations: 0,
                     is_out_of_time: limit.is_over(),
@@ -241,7 +241,7 @@ impl<'a> Session<'a> {
             return Ok((Refined::OutOf(StopReason::Interrupted), None));
         }
         let (problem, analysis) = (&self.setup.problem, &optimised.best.analysis);
-        let Some(estimate) = levels.estimate(problem, analysis, observer) else {
+        let Some(estimate) = levels.estimator(problem).estimate(analysis, observer) else {
             return Ok((Refined::No, None));
         };
         let refined = levels.refine(

@@ -104,18 +104,7 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         rows.extend(saturation.regions.iter().map(|region| saturated(region, at)));
         rows.push(("Newton steps", format!("{}{at}", saturation.newton_steps)));
     }
-    if result.loads.is_empty() {
-        let row = |coil| ("coil", coil_text(coil, result.errors.as_ref()));
-        rows.extend(result.coils.iter().map(row));
-    }
-    for state in result.states.iter().filter(|_| !result.loads.is_empty()) {
-        let under = state.load.as_deref().map(|load| format!(" under {}", printable(load)));
-        let row = |coil| {
-            let text = coil_text(coil, state.errors.as_ref());
-            ("coil", format!("{text}{}", under.as_deref().unwrap_or_default()))
-        };
-        rows.extend(state.coils.iter().map(row));
-    }
+    rows.extend(coils(result));
     for set in &result.multipoles {
         rows.push(("expansion", expansion_text(set, result.errors.as_ref())));
     }
@@ -140,6 +129,21 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
     let rows = rows.into_iter().map(|(name, text)| format!("{name:<22} {text}"));
     rows.chain(probes::lines(&result.probes, result.errors.as_ref(), frequency)).collect()
+}
+
+/// What the terminals of coils see, under several loads for each.
+fn coils(result: &RunResult) -> Vec<Row> {
+    if result.loads.is_empty() {
+        let row = |coil| ("coil", coil_text(coil, result.errors.as_ref()));
+        return result.coils.iter().map(row).collect();
+    }
+    let of_state = |state: &StateResult| -> Vec<Row> {
+        let under =
+            state.load.as_deref().map(|load| format!(" under {}", printable(load))).unwrap_or_default();
+        let row = |coil| ("coil", format!("{}{under}", coil_text(coil, state.errors.as_ref())));
+        state.coils.iter().map(row).collect()
+    };
+    result.states.iter().flat_map(of_state).collect()
 }
 
 /// The error bar of a value with an estimated error, behind it.

@@ -19,6 +19,16 @@ pub fn face_key(mut nodes: [NodeId; 3]) -> [NodeId; 3] {
     nodes
 }
 
+/// The nodes of an edge, ascending.
+pub fn edge_key([a, b]: [NodeId; 2]) -> [NodeId; 2] {
+    [a.min(b), a.max(b)]
+}
+
+/// The edges of a triangle, each with ascending nodes.
+pub fn triangle_edges([a, b, c]: [NodeId; 3]) -> [[NodeId; 2]; 3] {
+    [[a, b], [b, c], [c, a]].map(edge_key)
+}
+
 /// Whether two orders of the same three nodes have the same normal.
 pub(crate) fn same_turn(a: [NodeId; 3], b: [NodeId; 3]) -> bool {
     (0..3).any(|shift| (0..3).all(|k| a[k] == b[(k + shift) % 3]))

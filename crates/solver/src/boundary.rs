@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use fluxmorph_geometry::directions::beside;
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
+use fluxmorph_geometry::topology::triangle_edges;
 use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 
 use crate::error::SolverError;
@@ -105,7 +106,7 @@ pub(crate) fn check_applied<'a>(
     for (surface, boundary) in boundaries {
         let Boundary::UniformField(field) = boundary else { continue };
         let centre = field.centre.unwrap_or(default);
-        for edge in mesh.topology().surface(surface)?.iter().flat_map(edges) {
+        for edge in mesh.topology().surface(surface)?.iter().flat_map(|t| triangle_edges(*t)) {
             let potential = field.vector_potential(centre, middle(mesh, edge));
             largest = largest.max(norm(potential));
             let (first, other) = *applied.entry(edge).or_insert((potential, surface));
@@ -120,7 +121,7 @@ pub(crate) fn check_applied<'a>(
         return Err(SolverError::TwoFields { surfaces, place: middle(mesh, edge) });
     }
     for (name, triangles) in perfect {
-        for (triangle, edge) in triangles.iter().flat_map(|t| edges(t).map(|edge| (t, edge))) {
+        for (triangle, edge) in triangles.iter().flat_map(|t| triangle_edges(*t).map(|edge| (t, edge))) {
             let Some(&(potential, surface)) = applied.get(&edge) else { continue };
             let area = area_vector(triangle.map(|n| mesh.point(n)));
             if norm(cross(potential, area)) > CONFLICT * largest * norm(area) {
@@ -133,11 +134,6 @@ pub(crate) fn check_applied<'a>(
         }
     }
     Ok(())
-}
-
-/// The edges of a triangle, each with ascending nodes.
-fn edges(&[a, b, c]: &[NodeId; 3]) -> [[NodeId; 2]; 3] {
-    [[a, b], [b, c], [c, a]].map(|[m, n]| [m.min(n), m.max(n)])
 }
 
 fn middle(mesh: &Mesh, [a, b]: [NodeId; 2]) -> Point {

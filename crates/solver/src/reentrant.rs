@@ -10,7 +10,7 @@ use std::collections::{BTreeMap, HashSet};
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::tet4::{area_vector, dot, norm, sub};
-use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::topology::{face_key, triangle_edges};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use crate::fixed_directions::CREASE;
@@ -27,13 +27,7 @@ pub(crate) fn beside_reentrant_edges(
     let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
     let triangles: Vec<[NodeId; 3]> = outer.map(|facet| facet.nodes).collect();
     let is_listed: Vec<bool> = triangles.iter().map(|t| faces.contains(&face_key(*t))).collect();
-    let mut around: BTreeMap<[NodeId; 2], Vec<usize>> = BTreeMap::new();
-    for (t, triangle) in triangles.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
-            around.entry([a.min(b), a.max(b)]).or_default().push(t);
-        }
-    }
+    let around = around_edges(&triangles);
     let mut patches = DisjointSets::new(triangles.len());
     let mut beside = Vec::new();
     let listed_around = around.into_iter().filter(|(_, sides)| sides.iter().any(|&t| is_listed[t]));
@@ -56,6 +50,15 @@ pub(crate) fn beside_reentrant_edges(
     let found: HashSet<usize> = beside.into_iter().map(|t| patches.root(t)).collect();
     let is_beside = |t: &usize| is_listed[*t] && found.contains(&patches.root(*t));
     (0..triangles.len()).filter(is_beside).map(|t| triangles[t]).collect()
+}
+
+/// The triangles at every edge, by their numbers.
+pub(crate) fn around_edges(triangles: &[[NodeId; 3]]) -> BTreeMap<[NodeId; 2], Vec<usize>> {
+    let mut around: BTreeMap<[NodeId; 2], Vec<usize>> = BTreeMap::new();
+    for (t, triangle) in triangles.iter().enumerate() {
+        triangle_edges(*triangle).into_iter().for_each(|edge| around.entry(edge).or_default().push(t));
+    }
+    around
 }
 
 /// The pairs of outer faces at an edge with a part of the mesh between them: one, or more where parts touch at the edge.
@@ -108,15 +111,20 @@ enum Bend {
 }
 
 fn bend(mesh: &Mesh, edge: [NodeId; 2], [one, other]: [[NodeId; 3]; 2]) -> Bend {
-    let apex = apex(other, edge);
     let [n, m] = [one, other].map(|triangle| area_vector(triangle.map(|n| mesh.point(n))));
     if dot(n, m) > CREASE.to_radians().cos() * norm(n) * norm(m) {
         Bend::Smooth
-    } else if dot(n, sub(mesh.point(apex), mesh.point(edge[0]))) > 0.0 {
+    } else if is_reentrant(mesh, edge, [one, other]) {
         Bend::Reentrant
     } else {
         Bend::Convex
     }
+}
+
+/// Whether the domain has an interior angle above 180° between two faces that are oriented out of it.
+pub(crate) fn is_reentrant(mesh: &Mesh, edge: [NodeId; 2], [one, other]: [[NodeId; 3]; 2]) -> bool {
+    let normal = area_vector(one.map(|node| mesh.point(node)));
+    dot(normal, sub(mesh.point(apex(other, edge)), mesh.point(edge[0]))) > 0.0
 }
 
 /// Whether the domain has an interior angle above 90° between two faces, so that the mirror image makes it re-entrant; an angle

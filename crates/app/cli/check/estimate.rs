@@ -73,7 +73,7 @@ pub(super) fn of_initial_design(
     let mut listening = Listening { observer, notices: Vec::new() };
     let is_shown = analysis.objective.is_some() || !analysis.constraints.is_empty();
     let mut estimator = Estimator::new((&config, source), (&setup.problem, &setup.full_mesh));
-    let estimated = is_shown.then(|| estimator.estimate(&analysis, &mut listening)).flatten();
+    let estimated = is_shown.then(|| estimator.errors(&analysis, &mut listening)).flatten();
     let mut notices = listening.notices;
     if analysis.objective.is_none() {
         notices.push("there is no [objective] whose error could be estimated".to_owned());
@@ -82,14 +82,14 @@ pub(super) fn of_initial_design(
     if analysis.objective.is_some() && !is_of_field {
         notices.push("the objective is of the shape alone, and has no error of the field".to_owned());
     }
-    let constraints = estimated.iter().flat_map(|estimate| &estimate.errors.constraints);
+    let constraints = estimated.iter().flat_map(|errors| &errors.constraints);
     let constraints = constraints.map(|&(k, error)| ConstraintError {
         name: setup.problem.constraints()[k].name.clone(),
         value: analysis.constraints[k].value,
         error_estimate: error,
     });
     let constraints = constraints.collect();
-    let error = estimated.map(|estimate| estimate.errors.objective).filter(|_| is_of_field);
+    let error = estimated.map(|errors| errors.objective).filter(|_| is_of_field);
     let error_bar_relative =
         analysis.objective.zip(error).and_then(|(value, error)| relative_bar(error, value));
     Ok(EstimateSummary {

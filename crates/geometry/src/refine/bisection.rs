@@ -4,12 +4,12 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::marked::MarkedTet;
-use super::{RefineLimits, Refinement, edge_key, inherit, middle};
+use super::{RefineLimits, Refinement, inherit, middle};
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId};
 use crate::mesh::Mesh;
 use crate::tet4::{EDGES, Point, dot, sub};
-use crate::topology::Topology;
+use crate::topology::{Topology, edge_key};
 
 /// A mesh that is refined again and again; what is bisected next follows from all that was.
 #[derive(Clone, Debug)]

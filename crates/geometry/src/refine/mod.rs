@@ -98,8 +98,3 @@ impl Refinement {
 fn middle(a: Point, b: Point) -> Point {
     std::array::from_fn(|d| 0.5 * (a[d] + b[d]))
 }
-
-/// The nodes of an edge, ascending.
-fn edge_key([a, b]: [NodeId; 2]) -> [NodeId; 2] {
-    [a.min(b), a.max(b)]
-}

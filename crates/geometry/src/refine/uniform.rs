@@ -7,11 +7,12 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::{RefineLimits, Refinement, edge_key, inherit, middle};
+use super::{RefineLimits, Refinement, inherit, middle};
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId};
 use crate::mesh::Mesh;
 use crate::tet4::{EDGES, Point, dot, sub};
+use crate::topology::edge_key;
 
 /// Places in [`EDGES`] of the two ends of each diagonal: edges that have no vertex in common.
 const DIAGONALS: [[usize; 2]; 3] = [[0, 5], [1, 4], [2, 3]];

@@ -4,7 +4,7 @@ use crate::disjoint_sets::DisjointSets;
 use crate::ids::NodeId;
 use crate::mesh::Mesh;
 use crate::tet4::{Point, area_vector, centroid, dot, norm, sub};
-use crate::topology::Facet;
+use crate::topology::{Facet, triangle_edges};
 
 /// Two outer faces and the edge that they, and no others, have in common.
 pub(super) struct Ridge {
@@ -55,11 +55,7 @@ impl<'m> Hull<'m> {
 
     /// The edges of all faces with the faces at each.
     fn edges(&self) -> Vec<([NodeId; 2], usize)> {
-        let sorted = |a: NodeId, b: NodeId| if a < b { [a, b] } else { [b, a] };
-        let of = |(face, facet): (usize, &Facet)| {
-            let [a, b, c] = facet.nodes;
-            [(sorted(a, b), face), (sorted(b, c), face), (sorted(c, a), face)]
-        };
+        let of = |(face, facet): (usize, &Facet)| triangle_edges(facet.nodes).map(|edge| (edge, face));
         let mut edges: Vec<_> = self.faces.iter().enumerate().flat_map(of).collect();
         edges.sort_unstable();
         edges

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::tet4::{area_vector, centroid, norm};
+use fluxmorph_geometry::topology::triangle_edges;
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use super::{Mirror, dominant_axis};
@@ -24,13 +25,13 @@ impl BoundaryEdges {
     /// The boundary edges of `triangles`; `cuts` are the faces where the model ends.
     pub(super) fn new(triangles: &[[NodeId; 3]], cuts: &[[NodeId; 3]]) -> Self {
         let mut count: BTreeMap<Edge, usize> = BTreeMap::new();
-        for edge in triangles.iter().flat_map(edges) {
+        for edge in triangles.iter().flat_map(|t| triangle_edges(*t)) {
             *count.entry(edge).or_default() += 1;
         }
         let boundary: BTreeSet<Edge> =
             count.into_iter().filter(|&(_, n)| n == 1).map(|(edge, _)| edge).collect();
         let cut: BTreeSet<Edge> =
-            cuts.iter().flat_map(edges).filter(|edge| boundary.contains(edge)).collect();
+            cuts.iter().flat_map(|t| triangle_edges(*t)).filter(|edge| boundary.contains(edge)).collect();
         let free = boundary.difference(&cut).flatten().copied().collect();
         Self { free, cut }
     }
@@ -44,7 +45,8 @@ impl BoundaryEdges {
     pub(super) fn symmetry_planes(&self, mesh: &Mesh, cuts: &[[NodeId; 3]]) -> Vec<Mirror> {
         let [lower, upper] = mesh.bounding_box();
         let mut planes: Vec<Mirror> = Vec::new();
-        for triangle in cuts.iter().filter(|t| edges(t).iter().any(|edge| self.cut.contains(edge))) {
+        for triangle in cuts.iter().filter(|t| triangle_edges(**t).iter().any(|edge| self.cut.contains(edge)))
+        {
             let vertices = triangle.map(|n| mesh.point(n));
             let area = area_vector(vertices);
             let axis = dominant_axis(area);
@@ -58,9 +60,4 @@ impl BoundaryEdges {
         }
         planes
     }
-}
-
-fn edges(triangle: &[NodeId; 3]) -> [Edge; 3] {
-    let [a, b, c] = *triangle;
-    [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)])
 }

@@ -22,12 +22,13 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
-use fluxmorph_geometry::topology::face_key;
+use fluxmorph_geometry::topology::{face_key, triangle_edges};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::element::Complex3;
 use crate::fixed_directions::CREASE;
 use crate::model::FieldModel;
+use crate::reentrant::{around_edges, is_reentrant};
 use crate::solution::FieldSolution;
 use crate::surface::{Conductor, SurfaceLaw};
 
@@ -213,16 +214,11 @@ struct Strip {
 impl Bends {
     /// Those of a surface whose triangles are oriented into the conductor, and which goes on in its mirror image behind walls.
     fn of(mesh: &Mesh, surface: &[[NodeId; 3]], walls: impl Iterator<Item = [NodeId; 3]>) -> Self {
-        let edges = |[a, b, c]: [NodeId; 3]| [[a, b], [b, c], [c, a]].map(|[a, b]| [a.min(b), a.max(b)]);
-        let mut around: BTreeMap<[NodeId; 2], Vec<usize>> = BTreeMap::new();
-        for (k, triangle) in surface.iter().enumerate() {
-            edges(*triangle).into_iter().for_each(|edge| around.entry(edge).or_default().push(k));
-        }
+        let around = around_edges(surface);
         let mut wall_at: BTreeMap<[NodeId; 2], [NodeId; 3]> = BTreeMap::new();
         for wall in walls {
-            let ends =
-                edges(wall).into_iter().filter(|edge| around.get(edge).is_some_and(|own| own.len() == 1));
-            wall_at.extend(ends.map(|edge| (edge, wall)));
+            let is_end = |edge: &[NodeId; 2]| around.get(edge).is_some_and(|own| own.len() == 1);
+            wall_at.extend(triangle_edges(wall).into_iter().filter(is_end).map(|edge| (edge, wall)));
         }
         let normal = |triangle: [NodeId; 3]| unit(area_vector(triangle.map(|node| mesh.point(node))));
         let mut bends = Self::default();
@@ -230,7 +226,7 @@ impl Bends {
             match (sides.as_slice(), wall_at.get(&ends)) {
                 (&[one, other], _) => {
                     let turn = dot(normal(surface[one]), normal(surface[other])).clamp(-1.0, 1.0).acos();
-                    let is_convex = is_towards(mesh, ends, [surface[one], surface[other]]);
+                    let is_convex = is_reentrant(mesh, ends, [surface[one], surface[other]]);
                     bends.add(mesh, ends, [one, other], (if is_convex { turn } else { -turn }, 1.0));
                 }
                 (&[one], Some(wall)) => {
@@ -283,13 +279,6 @@ impl Bends {
         let ends_at_edges = triangle.iter().all(|node| self.sharp.contains_key(node));
         Some(Strip { width: if ends_at_edges { 0.5 * strip.width } else { strip.width }, ..strip })
     }
-}
-
-/// Whether the first of two triangles at an edge has the other one on the side that it is oriented to.
-fn is_towards(mesh: &Mesh, edge: [NodeId; 2], [one, other]: [[NodeId; 3]; 2]) -> bool {
-    let off = |node: &&NodeId| !edge.contains(node);
-    let apex = other.iter().find(off).map_or([0.0; 3], |node| sub(mesh.point(*node), mesh.point(edge[0])));
-    dot(area_vector(one.map(|node| mesh.point(node))), apex) > 0.0
 }
 
 #[cfg(test)]
