@@ -5,11 +5,11 @@ use std::path::Path;
 use serde_json::Value;
 
 use crate::coils::COILS;
-use crate::support::changed;
 use crate::support::device::{BLOCK, Device, shipped, written};
 use crate::support::essence::{assert_same, essence};
-use crate::support::folder::{RunFolder, count, files, number, read_json, scalars};
+use crate::support::folder::{RunFolder, count, files, number, read_json, read_text, scalars};
 use crate::support::program::{Finished, command, finish, fluxmorph, folder};
+use crate::support::{changed, repository};
 
 /// The block on edge elements.
 const EDGES: (&str, &str) = ("frequency = \"50 Hz\"", "frequency = \"50 Hz\"\nelements = \"edge\"");
@@ -406,4 +406,47 @@ fn a_conductor_that_has_more_loss_than_its_surface_is_named() {
         "{copper}"
     );
     assert!(!said("steel", &[]).contains("its impedance surface"));
+}
+
+/// Of copper, whose loss is what is optimised and bounded.
+#[test]
+fn what_impedance_surfaces_leave_out_is_said_of_objectives_and_bounds() {
+    let home = folder();
+    let changes = [
+        ("relative_permeability = 800", "relative_permeability = 1"),
+        ("conductivity = \"7e6 S/m\"", "conductivity = \"5.8e7 S/m\""),
+        (
+            "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"",
+            "kind = \"loss\"\nregion = \"plate\"",
+        ),
+        ("[design]", "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper = \"430 W\"\n\n[design]"),
+    ];
+    let config = home.path().join("plate.toml");
+    let text = read_text(&repository("configs/shield_quick.toml"));
+    std::fs::write(&config, changed(&text, &changes)).expect("written");
+    let of = |name: &str, more: &[&str]| {
+        let out = home.path().join(name);
+        let ended = finish(command(&[&name, &config, &"--out", &out]).args(more));
+        (ended, out)
+    };
+    let (ended, out) = of("solve", &[]);
+    ended
+        .completed()
+        .says(&["the constraint `loss_plate` keeps its bound by the loss of impedance surfaces", "% beyond"]);
+    let solved = read_json(&out.join("result.json"));
+    let share = number(&solved, "/accuracy/excess/0") / number(&solved, "/objective/initial");
+    let warned = format!("`plate` has about {:.1} % more loss", 100.0 * share);
+    let warnings = solved["warnings"].to_string();
+    assert!(warnings.contains(&warned) && warnings.contains("keeps its bound"), "{warned}: {warnings}");
+
+    let (ended, out) = of("run", &["--set", "optimizer.algorithm=slsqp", "--max-evaluations", "3"]);
+    ended.says(&["what impedance surfaces leave out", "and F/F0 from"]);
+    let run = read_json(&out.join("result.json"));
+    assert_eq!(run["accuracy"]["excess"][0], solved["accuracy"]["excess"][0]);
+    let [first, last] = [0, 1].map(|k| number(&run, &format!("/accuracy/excess/{k}")));
+    let [initial, best] = ["/objective/initial", "/objective/best"].map(|key| number(&run, key));
+    println!("of {initial:.2} and {best:.2} W: {first:.3} and {last:.3}");
+    assert!(best < initial && first != last, "of {initial} and {best} W {first} and {last}");
+    let page = read_text(&out.join("report.html"));
+    assert!(page.contains("with what impedance surfaces leave out of losses"), "the card of the gain");
 }

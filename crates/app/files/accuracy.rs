@@ -45,6 +45,10 @@ pub struct Accuracy {
     /// The curved surface whose facets are farthest off it; `None` where none is curved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub facets: Option<CurvedFacets>,
+    /// What the objective at the initial and at the best design has more, about, by the losses that impedance surfaces leave out at
+    /// sharp edges and where they are round [its unit]; of an analysis both are the same. `None` where it has no loss of one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub excess: Option<[f64; 2]>,
     /// What a wall that is near may cut off, in words; `None` where none is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub near_wall: Option<String>,
@@ -131,7 +135,7 @@ impl Accuracy {
 
     /// Whether there is something that no estimate of the field counts.
     pub fn says_something_of_the_geometry(&self) -> bool {
-        self.facets.is_some() || self.near_wall.is_some()
+        self.facets.is_some() || self.near_wall.is_some() || self.excess.is_some()
     }
 
     /// Enters the estimated errors of the objective at both designs of a run; its values without them.

@@ -344,6 +344,7 @@ pub(crate) mod tests {
                 levels: Vec::new(),
                 within_tolerance: None,
                 facets: None,
+                excess: None,
                 cross_check: Some(CrossCheck {
                     elements: "edge".to_owned(),
                     order: 2,

@@ -12,9 +12,9 @@ use fluxmorph_optimizer::driver::Best;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, Problem};
 use fluxmorph_remesh::Moved;
 
-use super::Session;
 use super::estimate::{Estimate, Estimator, left_out};
 use super::finer::{Cut, FinerProblem, looked_at_once};
+use super::{Session, excess};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
@@ -51,6 +51,14 @@ impl InitialField {
         }
     }
 
+    /// The field, where that is known.
+    pub(super) fn known(&self) -> Option<&Analysis> {
+        match self {
+            Self::Moved(_) => None,
+            Self::Solved(analysis) => Some(analysis),
+        }
+    }
+
     /// The field, by the methods of the linear solver that worked for the best design.
     pub(super) fn analysis(self, problem: &Problem, best: &Analysis) -> Result<Box<Analysis>, Error> {
         match self {
@@ -61,6 +69,16 @@ impl InitialField {
             Self::Solved(analysis) => Ok(analysis),
         }
     }
+}
+
+/// What is known of the values of a run before they are checked.
+pub(super) struct Known<'a> {
+    /// Estimated errors of the objective at the initial and the best design [its unit].
+    pub(super) errors: Option<[f64; 2]>,
+    /// What impedance surfaces leave out of it at both [its unit].
+    pub(super) excess: Option<[f64; 2]>,
+    /// How the mesh was refined.
+    pub(super) refinements: Option<&'a Refinements>,
 }
 
 impl Session<'_> {
@@ -103,15 +121,20 @@ impl Session<'_> {
         &self,
         (objective, stop_reason, keeps_all): (&ObjectiveResult, StopReason, bool),
         meshes: &ShapeMeshes,
-        (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
+        known: &Known<'_>,
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
+        let &Known { errors, excess, refinements } = known;
         let is_said = errors.is_some()
             || objective.is_verified_on_cut_elements()
             || self.is_geometry_looked_at() && self.is_checked(stop_reason);
         let facets = if is_said { self.facets_of_run(objective, meshes, observer) } else { None };
         let near_wall = is_said.then(|| self.near_wall_noted(observer)).flatten();
-        let mut accuracy = Accuracy { facets, near_wall, ..Accuracy::default() };
+        let mut accuracy = Accuracy { facets, near_wall, excess, ..Accuracy::default() };
+        let of_run = [objective.initial, objective.best];
+        if let Some(notice) = excess.and_then(|excess| excess::described(excess, of_run)) {
+            observer.notice(&notice);
+        }
         if !self.has_field_objective() {
             return Some(accuracy).filter(Accuracy::says_something_of_the_geometry);
         }
@@ -119,9 +142,12 @@ impl Session<'_> {
             accuracy.refined(refinements);
         }
         // Where facets change what is not known, nothing is said of the tolerance.
-        let known = accuracy.facets.as_ref().map_or(Some([0.0; 2]), |facets| facets.change);
-        if let Some(((tolerance, errors), changes)) = self.config.accuracy.tolerance.zip(errors).zip(known) {
-            let kept = kept(tolerance, (errors, changes), objective, observer);
+        let of_facets = accuracy.facets.as_ref().map_or(Some([0.0; 2]), |facets| facets.change);
+        if let Some(((tolerance, errors), of_facets)) =
+            self.config.accuracy.tolerance.zip(errors).zip(of_facets)
+        {
+            let unrefined = [of_facets, excess.unwrap_or_default()];
+            let kept = kept(tolerance, (errors, unrefined), objective, observer);
             accuracy.within_tolerance = Some(kept == Kept::Yes);
             let at_limit = matches!(stop_reason, StopReason::MaxEvaluations | StopReason::MaxTime);
             let can_refine = |own: &Refinements| own.refinements.len() < self.config.accuracy.max_refinements;
@@ -132,7 +158,7 @@ impl Session<'_> {
                 ));
             }
         }
-        let corrected = errors.map(|errors| accuracy.estimated([objective.initial, objective.best], errors));
+        let corrected = errors.map(|errors| accuracy.estimated(of_run, errors));
         let analysis = &self.config.analysis;
         let is_checked = self.is_checked(stop_reason) && objective.ratio != 1.0;
         accuracy.cross_check = match (analysis.elements, analysis.order) {
@@ -185,10 +211,11 @@ impl Session<'_> {
         let cross_check = accuracy.cross_check.as_ref().map(|check| check.values);
         let verified = objective.verification.as_ref().map(|found| [found.initial, found.best]);
         let mut others: Vec<[f64; 2]> = [verified, corrected, cross_check].into_iter().flatten().collect();
-        // Of the same mesh and elements: it may speak against a gain, and is none for it.
+        // Of the same mesh and elements: they may speak against a gain, and are none for it.
         let on_surfaces = accuracy.facets.as_ref().and_then(|facets| facets.change);
-        if let Some([first, last]) = on_surfaces.filter(|_| !others.is_empty()) {
-            others.push([objective.initial + first, objective.best + last]);
+        if !others.is_empty() {
+            let changed = |[first, last]: [f64; 2]| [objective.initial + first, objective.best + last];
+            others.extend([on_surfaces, accuracy.excess].into_iter().flatten().map(changed));
         }
         // A best design that is none for the objective alone, as where it has to keep a constraint first, has no gain, nor has one
         // that violates a constraint.
@@ -203,7 +230,8 @@ impl Session<'_> {
             };
             observer.warning(&format!(
                 "the gain of this run is not confirmed: less than half of it is left on another mesh, by other elements, \
-                 without the estimated errors or with its facets on their surfaces; {cure}, with smaller faces where they are curved"
+                 without the estimated errors, with its facets on their surfaces or with what impedance surfaces leave out; {cure}, with \
+                 smaller faces where they are curved"
             ));
         }
         let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error);
@@ -278,45 +306,50 @@ impl Session<'_> {
 /// Whether a tolerance is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kept {
-    /// By the error bars with what facets change.
+    /// By the error bars with what no refinement takes away.
     Yes,
-    /// By the error bars, but not with what facets change, which no refinement takes away.
-    ButForFacets,
+    /// By the error bars, but not with what no refinement takes away.
+    ButForUnrefined,
     /// An error bar is beyond it.
     ByNoBar,
 }
 
-/// Whether the error bars of both designs, with what facets change, are within a tolerance; which are not is reported.
+/// Whether the error bars of both designs, with what facets change and what impedance surfaces leave out, are within a tolerance;
+/// which are not is reported.
 fn kept(
     tolerance: f64,
-    (errors, changes): ([f64; 2], [f64; 2]),
+    (errors, [of_facets, of_surfaces]): ([f64; 2], [[f64; 2]; 2]),
     objective: &ObjectiveResult,
     observer: &mut dyn Observer,
 ) -> Kept {
     let larger = objective.initial.abs().max(objective.best.abs());
     let designs = [("initial", objective.initial), ("best", larger)];
     let (mut kept, mut beyond) = (Kept::Yes, Vec::new());
-    for ((design, scale), (error, change)) in designs.into_iter().zip(errors.into_iter().zip(changes)) {
-        let bar = relative_bar(error, scale).unwrap_or(f64::INFINITY);
-        let facets = (change / scale).abs();
-        if bar + facets <= tolerance {
+    for (k, (design, scale)) in designs.into_iter().enumerate() {
+        let bar = relative_bar(errors[k], scale).unwrap_or(f64::INFINITY);
+        let [facets, surfaces] = [of_facets[k], of_surfaces[k]].map(|change| (change / scale).abs());
+        if bar + facets + surfaces <= tolerance {
             continue;
         }
         if bar > tolerance {
             kept = Kept::ByNoBar;
         } else if kept == Kept::Yes {
-            kept = Kept::ButForFacets;
+            kept = Kept::ButForUnrefined;
         }
-        let of_facets = match change {
+        let more = [("the change of facets", facets), ("what impedance surfaces leave out", surfaces)];
+        let more = more.map(|(what, size)| match size {
             0.0 => String::new(),
-            _ => format!(" and the change of facets {:.3} %", 100.0 * facets),
-        };
-        beyond.push(format!("{:.3} %{of_facets} for the {design} design", 100.0 * bar));
+            _ => format!(" and {what} {:.3} %", 100.0 * size),
+        });
+        beyond.push(format!("{:.3} %{} for the {design} design", 100.0 * bar, more.concat()));
     }
     if !beyond.is_empty() {
         let cure = match kept {
-            Kept::ButForFacets => {
+            Kept::ButForUnrefined if of_surfaces == [0.0; 2] => {
                 "; no refinement takes the facets away, but a mesh with smaller faces there"
+            }
+            Kept::ButForUnrefined => {
+                "; no refinement takes that away: mesh the regions that are surfaces, begin with smaller faces where they are curved"
             }
             _ => "",
         };

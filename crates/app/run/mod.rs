@@ -7,6 +7,7 @@
 
 pub mod confirmation;
 pub(crate) mod estimate;
+mod excess;
 mod facets;
 pub mod finer;
 pub mod journal;
@@ -33,7 +34,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use confirmation::ShapeMeshes;
+use confirmation::{Known, ShapeMeshes};
 use estimate::Estimate;
 use facets::FirstFacets;
 use fluxmorph_geometry::Mesh;
@@ -56,8 +57,8 @@ use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{
-    CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, Refinements,
-    RunDirectory, RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
+    CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory,
+    RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
 };
 use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
@@ -243,6 +244,8 @@ impl Session<'_> {
             )?
         };
         result.warnings.splice(0..0, optimised.warnings.clone());
+        let of_best = (&best.analysis, &optimised.bounds[..]);
+        let excess = self.excess_of_run(first.known(), of_best, &mut result.warnings, observer);
         self.keep_search(&mut result, observer)?;
         let errors = self.estimate_errors(first, (best, reason), at_best, observer);
         if let Some((at_initial, at_best)) = &errors {
@@ -256,7 +259,8 @@ impl Session<'_> {
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
-        self.confirm(result, (&shapes, &meshes), (errors, refinements.as_ref()), observer)
+        let known = Known { errors, excess, refinements: refinements.as_ref() };
+        self.confirm(result, (&shapes, &meshes), &known, observer)
     }
 
     /// Enters the estimated errors at the initial and the best design, and writes where those of the best one are made.
@@ -360,11 +364,11 @@ impl Session<'_> {
         &mut self,
         mut result: RunResult,
         (shapes, meshes): (&ShapePair, &ShapeMeshes),
-        (errors, refinements): (Option<[f64; 2]>, Option<&Refinements>),
+        known: &Known<'_>,
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         // A mesh that is refined where it counts may be finer there than one that is generated anew.
-        let fresh = if Self::is_refined(refinements) {
+        let fresh = if Self::is_refined(known.refinements) {
             None
         } else {
             FreshMesh::of(self.config, &self.setup.problem)
@@ -389,8 +393,7 @@ impl Session<'_> {
                 // `resume` can do it later: the search is complete, the run is not.
                 result.status = RunStatus::Interrupted;
             }
-            result.accuracy =
-                self.accuracy((objective, stop_reason, keeps_all), meshes, (errors, refinements), observer);
+            result.accuracy = self.accuracy((objective, stop_reason, keeps_all), meshes, known, observer);
             let is_measured = |own: &CurvedFacets| own.change.is_some();
             let facets = result.accuracy.as_ref().and_then(|accuracy| accuracy.facets.as_ref());
             if !facets.is_none_or(is_measured) && (self.interrupted)() {

@@ -8,11 +8,12 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
 use fluxmorph_geometry::{ElementId, Mesh, Readable, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_solver::audit::{ExcessLoss, excess_losses, weighted_median};
+use fluxmorph_solver::audit::weighted_median;
 use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
+use super::excess;
 use crate::build::{
     Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, result_warnings, skin_warnings,
 };
@@ -22,9 +23,6 @@ use crate::files::ObjectiveResult;
 /// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
 /// Bozorth, Ferromagnetism, 1951), ferrites at 0.5.
 const SATURATION: f64 = 2.0;
-
-/// Share of the loss of an impedance surface that may be left out without a word.
-const UNSAID_EXCESS: f64 = 0.01;
 
 /// Share of a region's volume that must lie beyond it: elements at re-entrant corners have a field that grows with refinement.
 const TOLERATED_SHARE: f64 = 1e-3;
@@ -56,7 +54,7 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
     all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
-    all.extend(excess_of_conductors(problem, analysis));
+    all.extend(excess::of_conductors(problem, analysis));
     let least = problem
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
@@ -103,38 +101,8 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
 }
 
 /// The load of a state, behind what is said of it.
-fn under(model: &FieldModel) -> String {
+pub(super) fn under(model: &FieldModel) -> String {
     model.setup().load_case.as_ref().map_or(String::new(), |load| format!(" under the load `{load}`"))
-}
-
-/// What impedance surfaces leave out of losses, of each where that is the largest share.
-fn excess_of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
-    let mut worst: BTreeMap<String, (ExcessLoss, &FieldModel)> = BTreeMap::new();
-    for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
-        for found in excess_losses(model, &analysis.mesh, solution) {
-            let largest = worst.get(&found.region).map_or(UNSAID_EXCESS, |(own, _)| own.share().abs());
-            if found.share().abs() > largest {
-                worst.insert(found.region.clone(), (found, model));
-            }
-        }
-    }
-    let text = |(found, model): &(ExcessLoss, &FieldModel)| {
-        let more = if found.share() > 0.0 { "more" } else { "less" };
-        let (why, cure) = if found.at_edges.abs() > found.of_curvature.abs() {
-            ("at its sharp edges", ", or mesh its edges round")
-        } else {
-            ("where it is round", "")
-        };
-        format!(
-            "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}: there a conductor is no half \
-             space, and no error bar counts that. Where its loss matters, mesh it (model = \"volume\"){cure}",
-            found.region,
-            100.0 * found.share().abs(),
-            Readable(model.setup().frequency),
-            under(model),
-        )
-    };
-    worst.values().map(text).collect()
 }
 
 /// Skin audits of iron with a B–H curve, of the permeability that the fields leave at its surface.

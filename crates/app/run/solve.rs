@@ -6,6 +6,7 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, 
 use fluxmorph_remesh::Moved;
 
 use super::estimate::Estimate;
+use super::excess::LeftOut;
 use super::finer::{Cut, FinerProblem};
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
@@ -116,7 +117,12 @@ impl Session<'_> {
         exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let (reason, timings) = (StopReason::Done, &analysis.timings);
-        let accuracy = self.accuracy_of(analysis, halvings, estimate.as_ref(), observer);
+        let left_out = LeftOut::of(problem, analysis);
+        let at_initial = Some(&left_out).filter(|_| has_initial_bounds);
+        let broken = left_out.broken_bounds(problem, (analysis, &bounds), at_initial);
+        broken.iter().for_each(|warning| observer.warning(warning));
+        let excess = left_out.of_objective(problem, analysis);
+        let accuracy = self.accuracy_of((analysis, halvings), (estimate.as_ref(), excess), observer);
         let mut result = RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
@@ -133,6 +139,7 @@ impl Session<'_> {
             constraints,
             ..self.result(reason, analysis, None, initial_quality, timings, observer)?
         };
+        result.warnings.extend(broken);
         if let Some(estimate) = estimate {
             result.enter_errors(&estimate.of_states);
         }
@@ -142,9 +149,8 @@ impl Session<'_> {
     /// What is known of how exact the objective of an analysis is.
     fn accuracy_of(
         &self,
-        analysis: &Analysis,
-        halvings: u32,
-        estimate: Option<&Estimate>,
+        (analysis, halvings): (&Analysis, u32),
+        (estimate, excess): (Option<&Estimate>, Option<f64>),
         observer: &mut dyn RunObserver,
     ) -> Option<Accuracy> {
         let estimate = estimate.filter(|_| analysis.objective.is_some());
@@ -157,6 +163,7 @@ impl Session<'_> {
             refinements: halvings as usize,
             facets: self.facets_of(None, &shapes, observer),
             near_wall: self.near_wall_noted(observer),
+            excess: excess.map(|excess| [excess; 2]),
             ..Accuracy::default()
         };
         match (objective, estimate) {

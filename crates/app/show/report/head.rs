@@ -121,7 +121,11 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
         .facets
         .as_ref()
         .map(|facets| format!("facets up to {} mm off {}", number(1e3 * facets.off_m, 2), facets.surface));
-    let remark: Vec<String> = [bar, other, refined, facets].into_iter().flatten().collect();
+    let excess = accuracy.excess.map(|[initial, best]| {
+        let without = (objective.best + best) / (objective.initial + initial);
+        format!("{} with what impedance surfaces leave out of losses", ticks::ratio(without))
+    });
+    let remark: Vec<String> = [bar, other, refined, facets, excess].into_iter().flatten().collect();
     Some(("gain", verdict.to_owned(), remark.join("; ")))
 }
 

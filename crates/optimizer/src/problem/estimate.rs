@@ -133,6 +133,13 @@ impl Problem {
         Ok(ErrorEstimate { objective, by_element: by_element.swap_remove(shown), ..estimate })
     }
 
+    /// What the objective of an analysed design has more where each term has so much more, before its weight. With an objective.
+    pub fn objective_has_more(&self, analysis: &Analysis, of_term: impl Fn(&Term) -> f64) -> f64 {
+        let of_group = |group: Vec<&Term>| group.into_iter().map(|term| term.weight * of_term(term)).sum();
+        let errors: Vec<f64> = self.groups_of_terms().into_iter().map(of_group).collect();
+        self.error_of_objective(analysis, &errors).1
+    }
+
     /// The error of an analysed design's objective from that of its sum, or from those of each term of a worst case; with it whose
     /// of these it is. Without its error another term may be the worst one.
     ///

@@ -1,0 +1,155 @@
+//! What impedance surfaces leave out of losses ([`excess_losses`]), in words, and what an objective of losses has more by it.
+//!
+//! Every mesh and all elements leave it out alike: it is in no estimate of the error and in no check, and a shape may have its gain
+//! from it.
+
+use std::collections::{BTreeMap, HashMap};
+
+use fluxmorph_geometry::Readable;
+use fluxmorph_optimizer::constraint::{Bound, Quantity};
+use fluxmorph_optimizer::objective::Term;
+use fluxmorph_optimizer::problem::{Analysis, Problem};
+use fluxmorph_solver::FieldModel;
+use fluxmorph_solver::audit::{ExcessLoss, excess_losses};
+
+use super::Session;
+use super::reservations::under;
+use crate::config::ObjectiveKind;
+use crate::show::Observer;
+
+/// Share of a loss, or of an objective, that may be left out without a word.
+const UNSAID: f64 = 0.01;
+
+/// What impedance surfaces leave out of losses in words, of each conductor where that is the largest share.
+pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
+    let mut worst: BTreeMap<String, (ExcessLoss, &FieldModel)> = BTreeMap::new();
+    for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
+        for found in excess_losses(model, &analysis.mesh, solution) {
+            let largest = worst.get(&found.region).map_or(UNSAID, |(own, _)| own.share().abs());
+            if found.share().abs() > largest {
+                worst.insert(found.region.clone(), (found, model));
+            }
+        }
+    }
+    let text = |(found, model): &(ExcessLoss, &FieldModel)| {
+        let more = if found.share() > 0.0 { "more" } else { "less" };
+        let (why, cure) = if found.at_edges.abs() > found.of_curvature.abs() {
+            ("at its sharp edges", ", or mesh its edges round")
+        } else {
+            ("where it is round", "")
+        };
+        format!(
+            "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}: there a conductor is no half \
+             space, and no error bar counts that. Where its loss matters, mesh it (model = \"volume\"){cure}",
+            found.region,
+            100.0 * found.share().abs(),
+            Readable(model.setup().frequency),
+            under(model),
+        )
+    };
+    worst.values().map(text).collect()
+}
+
+/// What impedance surfaces leave out of the losses of a design, in each state by region [W].
+pub(super) struct LeftOut(Vec<HashMap<String, f64>>);
+
+impl LeftOut {
+    /// That of an analysis.
+    pub(super) fn of(problem: &Problem, analysis: &Analysis) -> Self {
+        let of_state = |(model, solution)| {
+            let found = excess_losses(model, &analysis.mesh, solution).into_iter();
+            found.map(|own| (own.region, own.at_edges + own.of_curvature)).collect()
+        };
+        Self(problem.states().iter().zip(&analysis.solutions).map(of_state).collect())
+    }
+
+    /// What a term has more, about [W]; `None` where it is no loss of an impedance surface.
+    fn of_term(&self, term: &Term) -> Option<f64> {
+        let region = term.label.region.as_ref().filter(|_| term.label.kind == ObjectiveKind::Loss.name())?;
+        term.states.iter().filter_map(|&state| self.0[state].get(region)).copied().reduce(|a, b| a + b)
+    }
+
+    /// What the objective of the analysis has more, about [its unit]; `None` where it has no loss of an impedance surface.
+    pub(super) fn of_objective(&self, problem: &Problem, analysis: &Analysis) -> Option<f64> {
+        problem.objective()?.terms.iter().find_map(|term| self.of_term(term))?;
+        Some(problem.objective_has_more(analysis, |term| self.of_term(term).unwrap_or(0.0)))
+    }
+
+    /// What each constraint on the loss of an impedance surface has more, with its number [W].
+    fn of_constraints(&self, problem: &Problem) -> impl Iterator<Item = (usize, f64)> {
+        problem.constraints().iter().enumerate().filter_map(|(k, constraint)| match &constraint.quantity {
+            Quantity::Field(term) => Some((k, self.of_term(term)?)),
+            _ => None,
+        })
+    }
+
+    /// Bounds on losses that are kept by the surfaces alone, in words; those that are shares of what the initial design has by what
+    /// that leaves out.
+    pub(super) fn broken_bounds(
+        &self,
+        problem: &Problem,
+        (analysis, bounds): (&Analysis, &[Bound]),
+        at_initial: Option<&Self>,
+    ) -> Vec<String> {
+        let of_bound = |k: usize| match problem.constraints()[k].limit.share() {
+            Some(share) => {
+                let initial = at_initial?.of_constraints(problem).find(|own| own.0 == k)?;
+                Some(share * initial.1)
+            }
+            None => Some(0.0),
+        };
+        let of = |(k, more): (usize, f64)| {
+            let (bound, value) = (&bounds[k], analysis.constraints[k].value);
+            let beyond = bound.excess(value + more - of_bound(k)?);
+            (bound.is_satisfied(value) && beyond > UNSAID).then(|| {
+                format!(
+                    "the constraint `{}` keeps its bound by the loss of impedance surfaces; with what these leave out at sharp \
+                     edges and where they are round it is about {:.1} % beyond",
+                    problem.constraints()[k].name,
+                    100.0 * beyond
+                )
+            })
+        };
+        self.of_constraints(problem).filter_map(of).collect()
+    }
+}
+
+impl Session<'_> {
+    /// What impedance surfaces leave out of the objective at the initial and at the best design of a run [its unit], where it has a
+    /// loss of one and the initial field is known; bounds that are kept by the surfaces alone are reported and added to the warnings.
+    pub(super) fn excess_of_run(
+        &self,
+        initial: Option<&Analysis>,
+        (best, bounds): (&Analysis, &[Bound]),
+        warnings: &mut Vec<String>,
+        observer: &mut dyn Observer,
+    ) -> Option<[f64; 2]> {
+        let problem = &self.setup.problem;
+        let at_best = LeftOut::of(problem, best);
+        let at_initial = initial.map(|initial| (initial, LeftOut::of(problem, initial)));
+        let left_out_initially = at_initial.as_ref().map(|(_, left_out)| left_out);
+        for warning in at_best.broken_bounds(problem, (best, bounds), left_out_initially) {
+            observer.warning(&warning);
+            warnings.push(warning);
+        }
+        let (initial, left_out) = at_initial?;
+        Some([left_out.of_objective(problem, initial)?, at_best.of_objective(problem, best)?])
+    }
+}
+
+/// What impedance surfaces leave out of the objective of the initial and of the best design, in words; `None` where it is hardly
+/// anything.
+pub(super) fn described([at_initial, at_best]: [f64; 2], [initial, best]: [f64; 2]) -> Option<String> {
+    let [first, last] = [at_initial / initial.abs(), at_best / initial.abs().max(best.abs())];
+    (first.abs().max(last.abs()) > UNSAID).then(|| {
+        format!(
+            "what impedance surfaces leave out, at sharp edges and where they are round, changes the objective by about {:+.2} % at \
+             the initial and {:+.2} % at the best design, relative to the larger of both, and F/F0 from {:.5} to {:.5}, which no \
+             error bar and no mesh counts; where that matters, mesh these regions (model = \"volume\")",
+            100.0 * first,
+            100.0 * last,
+            best / initial,
+            (best + at_best) / (initial + at_initial)
+        )
+    })
+}
