@@ -57,3 +57,34 @@ fn a_signal_to_one_rank_ends_all_with_the_state_saved() {
         assert!(said.contains("fluxmorph resume"), "{said}");
     }
 }
+
+#[test]
+fn a_run_on_ranks_goes_on_with_other_limits() {
+    let folder = folder();
+    let (whole, out) = (folder.path().join("whole"), folder.path().join("out"));
+    completed(&mut on(2, "run", "shield.toml", &whole, &COARSE));
+    let fewer = ["optimizer.max_evaluations=2"];
+    completed(&mut on(2, "run", "shield.toml", &out, &[&COARSE[..], &fewer].concat()));
+    completed(fluxmorph(2).arg("resume").arg(&out).args(["--max-evaluations", "4"]));
+    completed(fluxmorph(2).arg("resume").arg(&out).args(["--max-evaluations", "6", "--max-time", "1 h"]));
+    assert_eq!(result(&out)["evaluations"], result(&whole)["evaluations"]);
+    assert_same(&out, &whole);
+}
+
+/// On one process it is refused at its key.
+#[test]
+fn an_initial_design_that_the_mesh_does_not_carry_is_refused_on_ranks_too() {
+    let folder = folder();
+    let far = ["design.upper=\"200 mm\"", "design.initial=\"150 mm\""];
+    let ends = [0, 2].map(|ranks| {
+        let out = folder.path().join(format!("on{ranks}"));
+        let ended =
+            on(ranks, "run", "shield.toml", &out, &[&COARSE[..], &far].concat()).output().expect("it ends");
+        assert!(!out.join("journal.jsonl").exists());
+        (ended.status.code(), String::from_utf8_lossy(&ended.stderr).into_owned())
+    });
+    for (code, said) in &ends {
+        assert_eq!(*code, Some(3), "{said}");
+        assert!(said.contains("of the initial design") && said.contains("design.initial"), "{said}");
+    }
+}

@@ -142,9 +142,16 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
             "lines of H [A/m], B [T], both ascending, with a comma between them; a header begins with #";
         Box::new(source.diagnostic(&key, message).expected(expected))
     };
-    let mut text = String::new();
-    let read = open_regular(path).and_then(|file| file.take(LARGEST_FILE).read_to_string(&mut text));
-    read.map_err(|error| refused(String::new(), error.to_string()))?;
+    let whole = |message: String| refused(String::new(), message);
+    let mut bytes = Vec::new();
+    let read = open_regular(path).and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes));
+    read.map_err(|error| whole(error.to_string()))?;
+    if bytes.len() as u64 > LARGEST_FILE {
+        return Err(whole(format!(
+            "it has more than {LARGEST_FILE} bytes, and a curve takes some hundred points"
+        )));
+    }
+    let text = String::from_utf8(bytes).map_err(|_| whole("it is no text in UTF-8".to_owned()))?;
     let hash = blake3_hex(text.as_bytes());
     let mut lines = Vec::new();
     let mut points = Vec::new();

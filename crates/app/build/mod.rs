@@ -309,9 +309,9 @@ fn optimisation_warnings(config: &Config, constraints: &[Constraint], mode: Mode
     warnings
 }
 
-/// Refuses an initial design of which the mesh carries a part alone. One process looks: several ranks move the mesh when all are set
-/// up.
-fn check_initial_design(source: &SourceMap, (shape, mesh): (&Shape, &Mesh)) -> Result<(), Error> {
+/// Refuses an initial design of which the mesh carries a part alone; on several ranks once all of them are set up, which move it
+/// together.
+pub(crate) fn check_initial_design(source: &SourceMap, (shape, mesh): (&Shape, &Mesh)) -> Result<(), Error> {
     let initial = shape.initial();
     if initial.iter().all(|&p| p == 0.0) {
         return Ok(());

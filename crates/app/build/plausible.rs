@@ -15,7 +15,7 @@ use rayon::prelude::*;
 
 use super::entries::material;
 use super::references::functionals;
-use super::soundness::faces_of;
+use super::soundness::{faces_of, faces_without_condition};
 use crate::config::{
     Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, MeshConfig,
     ObjectiveKind, RegionModel, SourceMap,
@@ -138,6 +138,14 @@ pub(super) fn warnings(
                 "the coils `{}` and `{}` are the same winding at the same place: their ampere-turns add up",
                 twin.name, coil.name
             ));
+        } else if let Some((twin, region)) =
+            config.coils[..i].iter().find_map(|own| Some((own, common_region(own, coil)?)))
+        {
+            warnings.push(format!(
+                "the currents of the coils `{}` and `{}` fill the same region `{region}`: they add up, and cancel where they are \
+                 opposite; of two conductors each is a region of its own",
+                twin.name, coil.name
+            ));
         }
     }
     if config.boundaries.is_empty() && !open_patches.is_empty() {
@@ -197,6 +205,16 @@ fn wave_warning(config: &Config, mesh: &Mesh) -> Option<String> {
              displacement currents, which are left out, are no longer small there"
         )
     })
+}
+
+/// The region that the currents of two coils fill.
+fn common_region<'a>(first: &Coil, second: &'a Coil) -> Option<&'a str> {
+    match (&first.shape, &second.shape) {
+        (CoilShape::Region(first), CoilShape::Region(second)) if first.region == second.region => {
+            Some(&second.region)
+        }
+        _ => None,
+    }
 }
 
 /// What to say of analytic windings that take the same place.
@@ -288,46 +306,52 @@ fn magnet_warnings(config: &Config, mesh: &Mesh, (name, remanence): (&str, Point
     let Ok(region) = topology.region(name) else { return warnings };
     warnings.extend(turning_surfaces(config, mesh, region, remanence).map(|Turning { surface, kind, part }| {
         format!(
-            "the magnet `{name}` is cut by `{surface}`, a surface of {kind}, which mirrors the part of its remanence {part} the surface \
-             reversed"
+            "the magnet `{name}` is cut by {surface}, {kind}, which mirrors the part of its remanence {part} the surface reversed"
         )
     }));
     warnings
 }
 
 /// A surface at which the images of a vector are others.
-struct Turning<'a> {
-    surface: &'a String,
+struct Turning {
+    /// Its name in marks, or what it is.
+    surface: String,
     /// Its condition.
     kind: &'static str,
     /// Which part of the vector is reversed.
     part: &'static str,
 }
 
-/// The first surface of either condition on which a region ends, and which mirrors a part of a vector there reversed, as it does of B.
-fn turning_surfaces<'a>(
-    config: &'a Config,
-    mesh: &'a Mesh,
+/// The first surface of either condition, and of none, on which a region ends, and which mirrors a part of a vector there reversed, as
+/// it does of B.
+fn turning_surfaces(
+    config: &Config,
+    mesh: &Mesh,
     region: RegionId,
     vector: Point,
-) -> impl Iterator<Item = Turning<'a>> {
+) -> impl Iterator<Item = Turning> {
     let topology = mesh.topology();
     let outer: HashSet<_> = topology.outer_faces(region).into_iter().map(face_key).collect();
     let boundaries = &config.boundaries;
     let across: fn(f64) -> bool = |share| share > INCLINED;
     let along: fn(f64) -> bool = |share| beside(share) > INCLINED;
-    let kinds = [
-        (&boundaries.flux_parallel, across, "flux_parallel", "across"),
-        (&boundaries.flux_normal, along, "flux_normal", "along"),
-    ];
-    kinds.into_iter().filter_map(move |(surfaces, is_reversed, kind, part)| {
-        let turns = |surface: &&String| {
-            let faces = faces_of(topology, [surface.as_str()]);
-            let mut own = faces.intersection(&outer);
-            own.any(|face| is_reversed(dot(normal(mesh, *face), vector).abs() / norm(vector)))
-        };
-        surfaces.iter().find(turns).map(|surface| Turning { surface, kind, part })
-    })
+    let turns = |faces: &HashSet<[NodeId; 3]>, is_reversed: fn(f64) -> bool| {
+        let mut own = faces.intersection(&outer);
+        own.any(|face| is_reversed(dot(normal(mesh, *face), vector).abs() / norm(vector)))
+    };
+    let named = |surfaces: &[String], is_reversed, kind, part| {
+        let found =
+            surfaces.iter().find(|surface| turns(&faces_of(topology, [surface.as_str()]), is_reversed));
+        found.map(|surface| Turning { surface: format!("`{surface}`"), kind, part })
+    };
+    let free = turns(&faces_without_condition(config, mesh), along).then(|| Turning {
+        surface: "an outer side without condition".to_owned(),
+        kind: "at which the field is left normal as in flux_normal",
+        part: "along",
+    });
+    let parallel = named(&boundaries.flux_parallel, across, "a surface of flux_parallel", "across");
+    let with_normal = named(&boundaries.flux_normal, along, "a surface of flux_normal", "along");
+    [parallel, with_normal, free].into_iter().flatten()
 }
 
 /// What a unit vector with this part across a surface has along it.
@@ -350,7 +374,7 @@ fn component_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         let region = mesh.topology().region(name).ok()?;
         let Turning { surface, .. } = turning_surfaces(config, mesh, region, direction).next()?;
         Some(format!(
-            "{path}: behind `{surface}` the images of `{name}` have another component along this direction, and what is computed is the \
+            "{path}: behind {surface} the images of `{name}` have another component along this direction, and what is computed is the \
              deviation of the meshed part from its own mean, which is not that of the whole device; take a direction that the plane \
              keeps, or mesh all of `{name}`"
         ))

@@ -32,11 +32,14 @@ pub(super) fn of_mesh(config: &Config, mesh: &Mesh, group: &RankGroup) -> Result
     Ok(Ownership { group: group.clone(), partition: Arc::new(partition) })
 }
 
-/// A number that identifies a problem: configuration, mesh and owners.
+/// A number that identifies a problem: configuration, mesh and owners. The limits of a run are the first rank's alone, which a
+/// resumed run may have others of.
 fn identity(config: &Config, mesh: &Mesh, partition: &Partition) -> u64 {
+    let mut config = config.clone();
+    (config.optimizer.max_evaluations, config.optimizer.max_time) = (1, None);
     let mut hasher = blake3::Hasher::new();
     hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
-    hasher.update(resolved_toml(config).as_bytes());
+    hasher.update(resolved_toml(&config).as_bytes());
     let topology = mesh.topology();
     for (node, point) in topology.nodes().zip(mesh.points()) {
         hasher.update(&(partition.owner_of(node) as u64).to_le_bytes());

@@ -132,6 +132,13 @@ pub(super) fn swap_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     })
 }
 
+/// The outer faces of a mesh that carry no condition.
+pub(super) fn faces_without_condition(config: &Config, mesh: &Mesh) -> HashSet<[NodeId; 3]> {
+    let hull = Hull::new(mesh);
+    let faces = hull.faces().iter().zip(with_condition(config, &hull));
+    faces.filter(|(_, has_condition)| !has_condition).map(|(facet, _)| face_key(facet.nodes)).collect()
+}
+
 /// For every face of a hull whether [boundaries] names a surface that it belongs to.
 fn with_condition(config: &Config, hull: &Hull<'_>) -> Vec<bool> {
     let infinity = open::condition(config).map(|(name, _)| name);

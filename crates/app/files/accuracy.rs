@@ -133,6 +133,12 @@ impl Accuracy {
         self.levels = refinements.refinements.iter().map(level).collect();
     }
 
+    /// Whether a gain that is confirmed is smaller than the error bar of its ratio.
+    pub fn hides_gain(&self, ratio: f64) -> bool {
+        let bar = self.error_estimate_relative.map(|error| SAFETY * error * ratio.abs());
+        self.verdict == Some(Verdict::Confirmed) && bar.is_some_and(|bar| bar >= (ratio - 1.0).abs())
+    }
+
     /// Whether there is something that no estimate of the field counts.
     pub fn says_something_of_the_geometry(&self) -> bool {
         self.facets.is_some() || self.near_wall.is_some() || self.excess.is_some()

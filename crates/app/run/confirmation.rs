@@ -19,8 +19,8 @@ use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
 use crate::files::{
-    Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, SAFETY, StopReason,
-    Verdict, relative_bar,
+    Accuracy, CrossCheck, CurvedFacets, ObjectiveResult, OverwritePolicy, Refinements, StopReason, Verdict,
+    relative_bar,
 };
 use crate::show::Observer;
 
@@ -234,10 +234,7 @@ impl Session<'_> {
                  smaller faces where they are curved"
             ));
         }
-        let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error);
-        if accuracy.verdict == Some(Verdict::Confirmed)
-            && bar.is_some_and(|bar| bar * objective.ratio.abs() >= (objective.ratio - 1.0).abs())
-        {
+        if accuracy.hides_gain(objective.ratio) {
             observer.warning(
                 "the gain of this run is smaller than its error bar: the checks have a gain as well, but how large it is stays \
                  open; a finer mesh tells",
@@ -267,11 +264,9 @@ impl Session<'_> {
         None
     }
 
-    /// Whether what no estimate of the field has is looked at, whatever the order: where an objective is, on one process.
+    /// Whether what no estimate of the field has is looked at, whatever the order: where an objective is.
     pub(super) fn is_geometry_looked_at(&self) -> bool {
-        self.config.accuracy.estimate != Some(false)
-            && self.config.objective.is_some()
-            && self.setup.problem.share().is_none()
+        self.config.accuracy.estimate != Some(false) && self.config.objective.is_some()
     }
 
     /// Whether the objective has errors of the field; those of a volume or mass are its constraints'.

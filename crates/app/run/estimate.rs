@@ -115,6 +115,9 @@ impl<'a> Estimator<'a> {
     }
 
     fn estimated(&mut self, of: Of, analysis: &Analysis, observer: &mut dyn Observer) -> Option<Estimate> {
+        if self.problem.share().is_some() && self.config.accuracy.estimate != Some(false) {
+            return left_out("that takes one process", observer);
+        }
         if let Some(shortage) = memory_limit::shortage(memory(self.config, self.problem)?) {
             observer.notice(&format!("the error of the mesh is not estimated, which takes {shortage}"));
             return None;

@@ -31,6 +31,9 @@ const LEAST_PART: f64 = 1.0 / 8.0;
 /// Why it is not known what facets change.
 #[derive(Debug, thiserror::Error)]
 enum NotMeasured {
+    /// Several ranks share the mesh.
+    #[error("that takes one process")]
+    OnRanks,
     /// A signal came first.
     #[error("it was stopped before")]
     CutShort,
@@ -204,6 +207,9 @@ impl Session<'_> {
 
     /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about.
     fn changes(&self, shapes: &[(&Mesh, f64)]) -> Result<Vec<f64>, NotMeasured> {
+        if self.setup.problem.share().is_some() {
+            return Err(NotMeasured::OnRanks);
+        }
         let check_interrupted = || if (self.interrupted)() { Err(NotMeasured::CutShort) } else { Ok(()) };
         check_interrupted()?;
         let (config, full, first) = (self.config, &self.setup.full_mesh, &self.facets);

@@ -1,7 +1,7 @@
 //! What a state reports beside the objective, and its errors: what a field of one order more has more of it, or one on halved edges.
 //!
-//! The estimate of the objective has that field at hand; a second evaluation of losses, forces, flux linkages, expansions and probes
-//! on it costs next to nothing. Does not live here: the fields (`estimate`) and what is written of a state (`summary`).
+//! The estimate of the objective has that field at hand; a second evaluation of losses, forces, currents, flux linkages, expansions and
+//! probes on it costs next to nothing. Does not live here: the fields (`estimate`) and what is written of a state (`summary`).
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
@@ -9,7 +9,7 @@ use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_optimizer::body::{Body, BodyForce};
 use fluxmorph_optimizer::problem::Problem;
-use fluxmorph_solver::circuit::flux_linkages;
+use fluxmorph_solver::circuit::{currents, flux_linkages};
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
 
@@ -35,6 +35,7 @@ pub(super) fn is_something(config: &Config, problem: &Problem) -> bool {
 /// What a state reports, by names.
 pub(super) struct Reported {
     losses: Vec<(String, f64)>,
+    currents: Vec<(String, c64)>,
     flux_linkages: Vec<(String, c64)>,
     forces: Vec<BodyForce>,
     expansions: Vec<(String, Terms)>,
@@ -89,6 +90,7 @@ impl Reported {
         let expansions = expansions(config, (model, mesh, solution)).ok()?;
         Some(Self {
             losses: solution.losses(model, mesh),
+            currents: currents(model, solution),
             flux_linkages: flux_linkages(model, mesh, solution),
             forces: bodies.iter().map(|body| body.force(model, mesh, solution)).collect(),
             expansions,
@@ -103,7 +105,7 @@ impl Reported {
         };
         let loss =
             |((name, own), (_, more)): (&(String, f64), &(String, f64))| (name.clone(), times * (more - own));
-        let linkage = |((name, own), (_, more)): (&(String, c64), &(String, c64))| {
+        let amplitude = |((name, own), (_, more)): (&(String, c64), &(String, c64))| {
             (name.clone(), length(&[*own], &[*more]))
         };
         let force = |(own, more): (&BodyForce, &BodyForce)| {
@@ -126,7 +128,15 @@ impl Reported {
         let errors = StateErrors {
             multipoles_t: self.expansions.iter().zip(&better.expansions).map(expansion).collect(),
             losses_w: self.losses.iter().zip(&better.losses).map(loss).collect(),
-            flux_linkages_wb: self.flux_linkages.iter().zip(&better.flux_linkages).map(linkage).collect(),
+            // A current that is given has none.
+            currents_a: self
+                .currents
+                .iter()
+                .zip(&better.currents)
+                .map(amplitude)
+                .filter(|own| own.1 > 0.0)
+                .collect(),
+            flux_linkages_wb: self.flux_linkages.iter().zip(&better.flux_linkages).map(amplitude).collect(),
             forces: self.forces.iter().zip(&better.forces).map(force).collect(),
             probes_t: self.probes.iter().zip(&better.probes).map(probe).collect(),
         };

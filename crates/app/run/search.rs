@@ -141,15 +141,21 @@ impl<'a> Session<'a> {
         if self.setup.problem.share().is_none() {
             return Ok(levels);
         }
-        if levels.is_some_and(|levels| levels.has_kept()) {
-            let path: PathBuf = self.directory.path().to_owned();
-            let cause = "its mesh was refined, which takes one process: resume it without ranks".to_owned();
-            return Err(Error::NotResumable { path, cause });
-        }
         if self.config.accuracy.tolerance.is_some() {
             observer.warning("accuracy.tolerance needs one process: the mesh of this run is not refined");
         }
         Ok(None)
+    }
+
+    /// Refuses to go on with a refined mesh on several ranks.
+    pub(super) fn check_levels(&self) -> Result<(), Error> {
+        let is_shared = self.setup.problem.share().is_some();
+        if is_shared && Levels::of(self)?.is_some_and(|levels| levels.has_kept()) {
+            let path: PathBuf = self.directory.path().to_owned();
+            let cause = "its mesh was refined, which takes one process: resume it without ranks".to_owned();
+            return Err(Error::NotResumable { path, cause });
+        }
+        Ok(())
     }
 
     /// Ends a run before its next evaluation once a signal came.

@@ -48,6 +48,11 @@ pub fn solve(
     let mesh = prepared.mesh_hash();
     let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p));
     if halvings > 0 {
+        if problem.share().is_some() {
+            observer.warning(
+                "a refined mesh is solved on by the first rank alone: it must fit into the memory of one, and the others wait",
+            );
+        }
         let cut = Cut::Halvings(halvings);
         let finer = FinerProblem::new(config, source, &prepared.setup.full_mesh, cut)?;
         moved = finer.moved(&moved.mesh)?;

@@ -219,7 +219,8 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ];
         let alone = opinions.iter().filter(|is_there| **is_there).count() == 1;
         let remark = if alone { " (by one check alone)" } else { "" };
-        ("gain", format!("{}{remark}", styled(style, verdict.describe())))
+        let small = if accuracy.hides_gain(*ratio) { ", but smaller than its error bar" } else { "" };
+        ("gain", format!("{}{small}{remark}", styled(style, verdict.describe())))
     }));
     rows
 }
@@ -261,9 +262,10 @@ fn coil_text(coil: &CoilResult, errors: Option<&StateErrors>) -> String {
         Amplitude::Phasor([re, im]) => format!("({re:.6e} {im:+.6e}j)"),
     };
     format!(
-        "{}: {} A, {} Wb{}, {:.6e} ohm, {} V",
+        "{}: {} A{}, {} Wb{}, {:.6e} ohm, {} V",
         printable(&coil.name),
         text(coil.current_a),
+        bar(errors.and_then(|errors| errors.currents_a.get(&coil.name)), "A"),
         text(coil.flux_linkage_wb),
         bar(errors.and_then(|errors| errors.flux_linkages_wb.get(&coil.name)), "Wb"),
         coil.resistance_ohm,

@@ -74,7 +74,8 @@ impl AxisBox {
         x * x + y * y + z * z
     }
 
-    fn with(self, other: &Self) -> Self {
+    /// The smallest box around both.
+    pub fn with(self, other: &Self) -> Self {
         Self {
             lower: std::array::from_fn(|d| self.lower[d].min(other.lower[d])),
             upper: std::array::from_fn(|d| self.upper[d].max(other.upper[d])),

@@ -2,9 +2,9 @@
 //!
 //! Does not live here: what is wrong (`build`), and the audit of skin depths (`fluxmorph_solver::audit`).
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::quality::qualities;
-use fluxmorph_geometry::tet4::{EDGES, FACES, Point, area_vector, norm, sub, volume};
+use fluxmorph_geometry::tet4::{EDGES, FACES, Point, area_vector, centroid, norm, sub, volume};
+use fluxmorph_geometry::{ElementId, Mesh, millimetres};
 
 use crate::build::Setup;
 use crate::config::{Config, ElementOrder, MeshConfig};
@@ -27,10 +27,13 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
                 .to_owned(),
         );
     }
-    let worst = if is_file { worst_without_layers(setup.problem.original()) } else { 1.0 };
-    if worst < POOR {
+    let mesh = setup.problem.original();
+    if let Some((worst, quality)) = worst_without_layers(mesh).filter(|_| is_file) {
         all.push(format!(
-            "the worst element that belongs to no thin layer has a quality of {worst:.4}; regenerate a mesh file whose worst quality is below {POOR}"
+            "the worst element that belongs to no thin layer has a quality of {quality:.1e}, in `{}` at {}; regenerate a mesh file whose \
+             worst quality is below {POOR}",
+            mesh.topology().region_name_at(worst),
+            millimetres(centroid(mesh.vertices(worst)))
         ));
     }
     if let Some(design) = &config.design {
@@ -50,11 +53,11 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
     all
 }
 
-/// The worst quality of the elements that are not flat because a layer is thin, as layers are that follow a skin depth.
-fn worst_without_layers(mesh: &Mesh) -> f64 {
+/// The worst of the poor elements that are not flat because a layer is thin, as layers are that follow a skin depth, with its quality.
+fn worst_without_layers(mesh: &Mesh) -> Option<(ElementId, f64)> {
     let poor = mesh.topology().elements().zip(qualities(mesh)).filter(|(_, quality)| *quality < POOR);
     let slivers = poor.filter(|(e, _)| !is_layered(mesh.vertices(*e)));
-    slivers.map(|(_, quality)| quality).fold(1.0, f64::min)
+    slivers.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Whether a flat element is as flat as its shortest edge is short: one edge stands on a layer, where those of a sliver lie in it.

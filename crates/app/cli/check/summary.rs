@@ -242,7 +242,7 @@ pub(super) fn summary<'a>(
         coils: &config.coils,
         boundaries: &config.boundaries,
         open: config.open.as_ref(),
-        truncation: Truncation::of(&setup),
+        truncation: Truncation::of(config, &setup),
         objective: config.objective.as_ref(),
         objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,

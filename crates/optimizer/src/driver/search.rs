@@ -221,7 +221,7 @@ impl<'a> Search<'a> {
         self.tightenings += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
         let plan = format!(": the search goes on with a relative tolerance of {:.0e}", self.ftol_rel);
-        run.note_going_on("the method ended within its first steps", &plan);
+        run.note_going_on("the method ended after a few evaluations", &plan);
     }
 
     /// Continues with the worst constraint as the objective.

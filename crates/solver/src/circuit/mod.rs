@@ -31,7 +31,7 @@ use crate::space::Space;
 use crate::unknowns::Unknowns;
 pub(crate) use border::{Border, Excitation};
 pub(crate) use solids::{SolidRows, Solids};
-pub use terminals::{CoilTerminals, Terminals, flux_linkages, terminals};
+pub use terminals::{CoilTerminals, Terminals, currents, flux_linkages, terminals};
 
 /// A coil's winding, and the circuit that it is in.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -92,6 +92,15 @@ pub fn flux_linkages(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
     windings.coils.iter().enumerate().map(of).collect()
 }
 
+/// Currents [A] of the coils with windings in a state, with their names: those that a voltage drives are found with the field.
+pub fn currents(model: &FieldModel, solution: &FieldSolution) -> Vec<(String, c64)> {
+    let windings = model.windings();
+    let of = |(k, driven): (usize, &Driven)| {
+        (model.coils()[driven.coil].name.clone(), windings.current(k, model, solution))
+    };
+    windings.coils.iter().enumerate().map(of).collect()
+}
+
 /// What the terminals see of a state; solves for 1 A in each coil with the state's matrix.
 ///
 /// # Errors
