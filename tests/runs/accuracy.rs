@@ -330,7 +330,8 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
     let aperture = "[[mesh.boxes.regions]]\nname = \"aperture\"\n\
                     box = [[\"0 mm\", \"0 mm\", \"24 mm\"], [\"8 mm\", \"8 mm\", \"36 mm\"]]\n\
                     size = [\"4 mm\", \"4 mm\", \"4 mm\"]\n\n[[mesh.boxes.surfaces]]";
-    let device = changed(device, &[("[[mesh.boxes.surfaces]]", aperture), frequencies]);
+    let driven = ("ampere_turns = \"20 A\"", "voltage = \"0.1 V\"");
+    let device = changed(device, &[("[[mesh.boxes.surfaces]]", aperture), frequencies, driven]);
     let more = "[[probes]]\nname = \"axis\"\npoints = [[\"0 mm\", \"0 mm\", \"30 mm\"], [\"5 mm\", \"0 mm\", \"10 mm\"]]\n\n\
                 [[forces]]\nname = \"plate\"\nregions = [\"plate\"]\n";
     let path = home.path().join("coils.toml");
@@ -359,6 +360,7 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
     };
     let cases = [
         ("losses_w/plate", vec!["/losses_w/plate".to_owned()]),
+        ("currents_a/two", parts("/coils/1/current_a", &[0, 1])),
         ("flux_linkages_wb/one", parts("/coils/0/flux_linkage_wb", &[0, 1])),
         ("flux_linkages_wb/two", parts("/coils/1/flux_linkage_wb", &[0, 1])),
         ("forces/plate/force_n", parts("/forces/0/force_n", &[0, 1, 2])),
@@ -387,7 +389,7 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
         "N on plate at 300 Hz ± ",
         "Wb ± ",
         "± mT",
-        "e-5 T (10000.00 units)",
+        "e-4 T (10000.00 units)",
     ]);
 }
 

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::support::folder::{read_json, read_text};
 use crate::support::program::{Finished, fluxmorph, folder};
-use crate::support::{changed, with_mesh_file};
+use crate::support::{changed, repository, with_mesh_file};
 
 pub(crate) const COILS: &str = include_str!("../support/coils.toml");
 
@@ -92,7 +92,6 @@ fn a_voltage_drives_the_current_that_needs_it() {
     let driven = result("solve", &[("ampere_turns = \"100 A\"", &drive)]);
     for (k, key) in [(0, "current_a"), (0, "flux_linkage_wb"), (1, "flux_linkage_wb"), (1, "voltage_v")] {
         let both = [&driven, &given].map(|result| phasor(&result["coils"][k][key]));
-        // What the issue asks for.
         assert!(deviation(both) < 1e-9, "{k} {key}: {both:?}");
     }
     let losses = [&driven, &given].map(|result| number(&result["losses_w"]["plate"]));
@@ -162,7 +161,6 @@ fn multipoles_are_those_of_a_fit_of_probes() {
         let name = format!("{letter}{n}");
         let term = terms.iter().find(|term| term["name"] == name.as_str()).expect("of the order");
         let main = field(0, 2).abs();
-        // What the issue asks for.
         assert!(
             (number(&term["value_t"]) - coefficient).abs() < 1e-6 * main,
             "{name}: {coefficient:e} {term}"
@@ -264,4 +262,21 @@ fn an_open_and_a_short_circuited_coil_are_two_loads_of_one_device() {
     println!("{found:?} {current:?}");
     assert!(deviation([found, current]) < 1e-9);
     assert_eq!(result["coils"], result["states"][0]["coils"]);
+}
+
+/// A copy of a coil that kept its region: go and return in one bar.
+#[test]
+fn two_currents_in_one_region_are_asked_about() {
+    let home = folder();
+    let text = read_text(&repository("configs/busbar.toml"));
+    let start = text.find("[[coils]]").expect("a coil");
+    let coil = &text[start..text.find("[boundaries]").expect("boundaries")];
+    let back = coil
+        .replace("name = \"bar\"", "name = \"back\"")
+        .replace("[\"z_min\", \"z_max\"]", "[\"z_max\", \"z_min\"]");
+    let config = home.path().join("twice.toml");
+    std::fs::write(&config, text.replace(coil, &format!("{coil}{back}"))).expect("written");
+    let json = fluxmorph(&[&"check", &config, &"--json"]).json();
+    let said = json["warnings"].to_string();
+    assert!(said.contains("`bar` and `back` fill the same region `bar`"), "{said}");
 }

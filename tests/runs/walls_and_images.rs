@@ -38,6 +38,47 @@ fn a_near_wall_is_named_with_the_error_that_no_bar_has() {
     assert_eq!(near_wall("open", &[estimated, conditions, open]), Value::Null);
 }
 
+/// Walls are the sides of the mesh, whatever their names and conditions; a lone plane that flux passes is one of symmetry. What is
+/// observed counts as coils and matter do.
+#[test]
+fn walls_are_known_by_where_they_are() {
+    let wall = |overrides: &[&str]| {
+        let json =
+            finish(command(&[&"check", &quick(), &"--json"]).args(set(overrides))).exits_with(0).json();
+        (json["truncation"]["surface"].clone(), number(&json, "/truncation/distance_m"))
+    };
+    let planes = "boundaries.flux_parallel=[\"x_min\", \"y_min\"]";
+    let named = wall(&[]);
+    assert_eq!(named.0, "z_min");
+    assert_eq!(wall(&[planes]), named, "without conditions");
+    let normal = "boundaries.flux_normal=[\"x_max\", \"y_max\", \"z_min\", \"z_max\"]";
+    assert_eq!(wall(&[planes, normal]), named, "flux passes them");
+    let sides = "boundaries.flux_parallel=[\"x_min\", \"y_min\", \"x_max\", \"y_max\", \"z_max\"]";
+    let lone = wall(&[sides, "boundaries.flux_normal=[\"z_min\"]"]);
+    assert!(lone.0 != "z_min" && lone.1 > named.1, "{lone:?} in place of {named:?}");
+    let probe = "probes=[{name = \"far\", points = [[\"0 mm\", \"0 mm\", \"-380 mm\"]]}]";
+    let observed = wall(&[probe]);
+    assert!(observed.0 == "z_min" && (0.015..0.025).contains(&observed.1), "{observed:?}");
+}
+
+/// The field is left normal to it, as to a flux-normal one.
+#[test]
+fn a_side_without_condition_that_cuts_a_magnet_is_named() {
+    let home = folder();
+    let sphere = read_text(&repository("configs/sphere.toml"));
+    let said = |planes: &str| {
+        let (before, rest) = sphere.split_once("flux_parallel").expect("conditions");
+        let (_, after) = rest.split_once("\n\n").expect("tables behind them");
+        let path = home.path().join("magnet.toml");
+        let conditions = format!("flux_parallel = [{planes}]\nflux_normal = [\"z_min\"]");
+        std::fs::write(&path, format!("{before}{conditions}\n\n{after}")).expect("written");
+        let magnet = set(&["analysis.frequency=0", "regions.sphere.remanence=[0, 1, 1]"]);
+        let json = finish(command(&[&"check", &path, &"--json"]).args(magnet)).exits_with(0).json();
+        texts(&json["warnings"]).contains("is cut by an outer side without condition, at which")
+    };
+    assert!(said("\"y_min\", \"outer\"") && !said("\"x_min\", \"y_min\""));
+}
+
 /// Of a component that all planes of symmetry keep the mean is the device's; of another one only that of the meshed part. The pole's
 /// observation ends at two flux-parallel planes and at a flux-normal one, which keep the component along z.
 #[test]

@@ -222,5 +222,13 @@ mod tests {
         std::fs::write(&table, format!("\u{feff}{HEAD}100000, 2.2\n")).expect("written");
         let curves = Curves::read(&config, &source).expect("a sound table");
         assert_eq!(curves.into_files().len(), 1);
+        // A long table is not cut.
+        let long = format!("{HEAD}{}100000, 2.2\n", "# a line without a point\n".repeat(50_000));
+        std::fs::write(&table, long).expect("written");
+        let message = Curves::read(&config, &source).expect_err("too long").to_string();
+        assert!(message.contains("it has more than 1048576 bytes"), "{message}");
+        std::fs::write(&table, b"H\0,\0\xff\xfe").expect("written");
+        let message = Curves::read(&config, &source).expect_err("UTF-16").to_string();
+        assert!(message.contains("it is no text in UTF-8"), "{message}");
     }
 }

@@ -4,6 +4,8 @@
 //! Walls are the sides of the mesh, whatever their names and conditions. A side that coils or matter reach is a plane of symmetry; so is
 //! a plane one that flux passes at a right angle, unless it has such a side, or one that is reached, opposite.
 
+use std::collections::HashSet;
+
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::soundness::{Hull, OpenPatch, open_patches};
 use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
@@ -135,7 +137,10 @@ fn sides(hull: &Hull<'_>, model: &FieldModel, sources: &AxisBox) -> Vec<Side> {
             patch,
         }
     };
-    open_patches(hull, &vec![false; faces.len()]).into_iter().map(of).collect()
+    let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
+    let replaced: HashSet<_> = replaced.map(|triangle| face_key(*triangle)).collect();
+    let is_matter: Vec<bool> = faces.iter().map(|face| replaced.contains(&face_key(face.nodes))).collect();
+    open_patches(hull, &is_matter).into_iter().map(of).collect()
 }
 
 /// What a side is called.
