@@ -18,7 +18,7 @@ use crate::topology::{Facet, Topology};
 
 /// Cosine of the largest angle, 42°, at which two facets are taken for one curved surface: a ball with nine of them along a circle,
 /// and no chamfer of 45°.
-const SMOOTH: f64 = 0.743;
+pub const SMOOTH: f64 = 0.743;
 
 /// Sine of the angle below which two faces are one plane, and share of an edge's length below which its middle is taken to lie on the
 /// surface: mesh files with few digits.

@@ -25,6 +25,11 @@ table! {
     /// that is not meshed. A node on a surface of `[boundaries]` or of `remesh.slide` moves within that surface's plane; where
     /// two such planes meet, along their edge.
     ///
+    /// Where faces of the surface meet at more than 42 degrees, their edge moves so that each of them is displaced by the same
+    /// length along its own normal: by √2 of the displacement at an edge of 90 degrees, √3 in the corner of a cube, and never
+    /// by more than twice the displacement, so that the tips of walls of less than 60 degrees stay behind. A surface that
+    /// meets its mirror image in a symmetry plane at such an angle moves there as at any other edge.
+    ///
     /// Symmetry planes, for `rim` and `filter_radius`, are the outer faces named in `[boundaries]` or `remesh.slide`: the model
     /// ends there, the device does not. The filter sees the mirror images of the nodes across them, so that a quarter model
     /// gives the surface of the whole.

@@ -87,10 +87,7 @@ impl<'a> Surface<'a> {
 
     /// Gives mirrored nodes the same area.
     pub(super) fn mirror_areas(&mut self, pairs: &[Vec<usize>]) {
-        for partner in pairs {
-            self.areas =
-                self.areas.iter().zip(partner).map(|(own, &other)| 0.5 * (own + self.areas[other])).collect();
-        }
+        super::symmetry::mirror_numbers(&mut self.areas, pairs);
     }
 
     /// The rows of the filter of this radius [m]; `planes` cut the surface.

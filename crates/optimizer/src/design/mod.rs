@@ -1,12 +1,13 @@
 //! Design variables: `p` moves the nodes of the design surface, every node along its own unit direction.
 //!
-//! `Δx_b = D W p`: `D` holds the directions (one for all, or the surface's normals, see `normal`), `W` the weights of the
-//! variables at every node. A variable is a node of the surface, a point of a control grid (`grid`), or a node seen through
-//! a smoothing filter (`filter`); mirror images may be constrained to be equal (`symmetry`), and the free boundary edges
-//! held (`boundary_edges`). In every case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at
-//! a node that stays. So the displacements keep the bounds of the variables, and the transpose, which takes derivatives at
-//! the nodes to those with respect to `p`, is exact. On a finer mesh of the same body the variables stay what they are
-//! (`refined`).
+//! `Δx_b = D M W p`: `D` holds the directions (one for all, or the surface's normals, see `normal`), `W` the weights of the
+//! variables at every node, and `M` the mitres, 1 but at nodes on sharp edges, which move further than the faces that meet
+//! there. A variable is a node of the surface, a point of a control grid (`grid`), or a node seen through a smoothing filter
+//! (`filter`); mirror images may be constrained to be equal (`symmetry`), and the free boundary edges held
+//! (`boundary_edges`). In every case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at a node
+//! that stays. So the displacements of the surface's faces keep the bounds of the variables, and the transpose, which takes
+//! derivatives at the nodes to those with respect to `p`, is exact. On a finer mesh of the same body the variables stay what
+//! they are (`refined`).
 
 mod boundary_edges;
 mod filter;
@@ -178,6 +179,8 @@ pub struct DesignSurface {
     nodes: Vec<NodeId>,
     /// Unit vectors, or zero at a node that cannot move; shape `(n_nodes, 3)`.
     directions: Vec<Point>,
+    /// Displacements of the nodes for a unit displacement of the faces around them.
+    mitres: Vec<f64>,
     rows: Vec<Row>,
     points: Vec<Point>,
     filter_radius: Option<f64>,
@@ -196,8 +199,8 @@ impl DesignSurface {
             return Err(DesignError::Empty);
         }
         let places: Vec<Point> = nodes.iter().map(|&n| mesh.point(n)).collect();
-        let mut directions = match setup.direction {
-            Direction::Along(direction) => vec![direction; nodes.len()],
+        let (mut directions, mut mitres) = match setup.direction {
+            Direction::Along(direction) => (vec![direction; nodes.len()], vec![1.0; nodes.len()]),
             Direction::Normal => normal::directions(mesh, &nodes, &setup.triangles, &setup.kept),
         };
         let on_nodes = !matches!(setup.control, Control::Grid(_));
@@ -207,7 +210,10 @@ impl DesignSurface {
             if mirrors_nodes { symmetry::pairs("node", &places, &setup.mirrors)? } else { Vec::new() };
         match setup.direction {
             Direction::Along(direction) => symmetry::check_direction(direction, &setup.mirrors)?,
-            Direction::Normal => symmetry::mirror_directions(&mut directions, &setup.mirrors, &pairs),
+            Direction::Normal => {
+                symmetry::mirror_directions(&mut directions, &setup.mirrors, &pairs);
+                symmetry::mirror_numbers(&mut mitres, &pairs);
+            }
         }
         let edges = boundary_edges::BoundaryEdges::new(&setup.triangles, &setup.cuts);
 
@@ -243,7 +249,7 @@ impl DesignSurface {
             Control::Filter(radius) => Some(radius),
             Control::Nodes | Control::Grid(_) => None,
         };
-        let mut surface = Self { nodes, directions, rows, points, filter_radius, grid_sides };
+        let mut surface = Self { nodes, directions, mitres, rows, points, filter_radius, grid_sides };
         if on_nodes {
             surface.drop_idle();
         }
@@ -311,22 +317,23 @@ impl DesignSurface {
         &self.points
     }
 
-    /// How far every node moves along its direction [m] for the variables `p` [m].
+    /// How far the surface moves at every node [m] for the variables `p` [m]: the node along its direction, or, on a sharp edge,
+    /// the faces around it along their normals.
     pub fn normal_displacements(&self, p: &[f64]) -> Vec<f64> {
         self.rows.iter().map(|row| row.iter().map(|&(k, weight)| weight * p[k]).sum()).collect()
     }
 
-    /// `Δx_b = D W p` [m], one displacement per node.
+    /// `Δx_b = D M W p` [m], one displacement per node.
     pub fn displacement(&self, p: &[f64]) -> Vec<Point> {
         let normal_displacements = self.normal_displacements(p);
         normal_displacements
             .iter()
-            .zip(&self.directions)
-            .map(|(along, direction)| direction.map(|d| along * d))
+            .zip(self.directions.iter().zip(&self.mitres))
+            .map(|(along, (direction, mitre))| direction.map(|d| mitre * along * d))
             .collect()
     }
 
-    /// `Wᵀ g`: from derivatives with respect to the nodes' displacements along their directions to those with respect to the variables.
+    /// `Wᵀ g`: from derivatives with respect to the normal displacements to those with respect to the variables.
     pub fn normal_displacement_gradient(&self, nodal: &[f64]) -> Vec<f64> {
         let mut gradient = vec![0.0; self.variable_count()];
         for (row, g) in self.rows.iter().zip(nodal) {
@@ -337,9 +344,10 @@ impl DesignSurface {
         gradient
     }
 
-    /// `Wᵀ Dᵀ g`: from derivatives with respect to the nodes' positions to those with respect to the variables.
+    /// `Wᵀ M Dᵀ g`: from derivatives with respect to the nodes' positions to those with respect to the variables.
     pub fn gradient(&self, nodal: &[Point]) -> Vec<f64> {
-        let along: Vec<f64> = self.directions.iter().zip(nodal).map(|(d, g)| dot(*d, *g)).collect();
+        let steps = self.directions.iter().zip(&self.mitres);
+        let along: Vec<f64> = steps.zip(nodal).map(|((d, mitre), g)| mitre * dot(*d, *g)).collect();
         self.normal_displacement_gradient(&along)
     }
 }

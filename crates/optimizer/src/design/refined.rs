@@ -3,7 +3,8 @@
 //! The variables live on the surface of the mesh that was refined. A new node lies in the middle of an edge, and moves by the
 //! mean of what the ends of that edge move: the facets of a design are the same on any of its meshes. Where all directions are
 //! one, that holds to the last bit; between nodes with normals `a` and `b` the new direction is that of `a + b`, and differs
-//! by the product of how much the directions and the displacements differ.
+//! by the product of how much the directions and the displacements differ. Behind a sharp edge `a` and `b` are the mitred steps
+//! of the ends, and the new node has half of their sum as its own.
 
 use std::collections::BTreeSet;
 
@@ -21,40 +22,59 @@ impl DesignSurface {
     #[must_use]
     pub fn refined(&self, triangles: &[[NodeId; 3]], coarse_nodes: usize, parents: &[[NodeId; 2]]) -> Self {
         let nodes: BTreeSet<NodeId> = triangles.iter().flatten().copied().collect();
-        let mut fine = Self { nodes: Vec::new(), directions: Vec::new(), rows: Vec::new(), ..self.clone() };
+        let mut fine = Self {
+            nodes: Vec::new(),
+            directions: Vec::new(),
+            mitres: Vec::new(),
+            rows: Vec::new(),
+            ..self.clone()
+        };
         for node in nodes {
-            let (direction, row) = match node.index().checked_sub(coarse_nodes) {
+            let own = match node.index().checked_sub(coarse_nodes) {
                 None => self.at(node),
                 Some(new) => mean(parents[new].map(|parent| fine.at(parent))),
             };
             fine.nodes.push(node);
-            fine.directions.push(direction);
-            fine.rows.push(row);
+            fine.directions.push(own.direction);
+            fine.mitres.push(own.mitre);
+            fine.rows.push(own.row);
         }
         fine
     }
 
-    /// Direction and weights at one of its nodes.
-    fn at(&self, node: NodeId) -> (Point, Row) {
+    /// How one of its nodes moves.
+    fn at(&self, node: NodeId) -> NodeStep {
         let place = self.nodes.binary_search(&node).expect("a node of the surface");
-        (self.directions[place], self.rows[place].clone())
+        NodeStep {
+            direction: self.directions[place],
+            mitre: self.mitres[place],
+            row: self.rows[place].clone(),
+        }
     }
 }
 
-/// Direction and weights between two nodes.
-fn mean([(a, row_a), (b, row_b)]: [(Point, Row); 2]) -> (Point, Row) {
-    let between: Point = std::array::from_fn(|d| 0.5 * (a[d] + b[d]));
+/// How a node moves: by the mitre times the variables with these weights, along the direction.
+struct NodeStep {
+    direction: Point,
+    mitre: f64,
+    row: Row,
+}
+
+/// How a node between two others moves.
+fn mean([a, b]: [NodeStep; 2]) -> NodeStep {
+    let between: Point = std::array::from_fn(|d| 0.5 * (a.mitre * a.direction[d] + b.mitre * b.direction[d]));
     let length = norm(between);
-    let (direction, share) = match [a, b].map(|direction| direction == [0.0; 3]) {
-        [true, _] => (b, 1.0),
-        [_, true] => (a, 1.0),
-        _ if a == b => (a, 1.0),
+    let (direction, mitre, share) = match [&a, &b].map(|end| end.direction == [0.0; 3]) {
+        [true, _] => (b.direction, b.mitre, 1.0),
+        [_, true] => (a.direction, a.mitre, 1.0),
+        _ if (a.direction, a.mitre) == (b.direction, b.mitre) => (a.direction, a.mitre, 1.0),
         // Of a surface that folds back nothing is left to move along.
-        _ if length < f64::EPSILON => ([0.0; 3], 0.0),
-        _ => (between.map(|c| c / length), length),
+        _ if length < f64::EPSILON => ([0.0; 3], 1.0, 0.0),
+        _ if (a.mitre, b.mitre) == (1.0, 1.0) => (between.map(|c| c / length), 1.0, length),
+        _ => (between.map(|c| c / length), length, 1.0),
     };
-    let mut row: Row = Vec::with_capacity(row_a.len() + row_b.len());
-    for (variable, weight) in row_a.into_iter().chain(row_b) {
+    let mut row: Row = Vec::with_capacity(a.row.len() + b.row.len());
+    for (variable, weight) in a.row.into_iter().chain(b.row) {
         row.push((variable, 0.5 * share * weight));
     }
     row.sort_by_key(|(variable, _)| *variable);
@@ -68,7 +88,7 @@ fn mean([(a, row_a), (b, row_b)]: [(Point, Row); 2]) -> (Point, Row) {
     if direction == [0.0; 3] {
         row.clear();
     }
-    (direction, row)
+    NodeStep { direction, mitre, row }
 }
 
 #[cfg(test)]

@@ -75,6 +75,13 @@ pub(super) fn mirror_directions(directions: &mut Vec<Point>, mirrors: &[Mirror],
     }
 }
 
+/// Makes numbers of mirrored nodes equal: the mean of both.
+pub(super) fn mirror_numbers(numbers: &mut Vec<f64>, pairs: &[Vec<usize>]) {
+    for partner in pairs {
+        *numbers = numbers.iter().zip(partner).map(|(own, &other)| 0.5 * (own + numbers[other])).collect();
+    }
+}
+
 /// The linear constraints of the variables: which old variable goes into which new one.
 pub(super) struct Groups {
     new_of: Vec<usize>,

@@ -22,19 +22,19 @@ fn plate_surface(mesh: &Mesh, grid: Option<[usize; 2]>) -> DesignSurface {
 }
 
 /// A block of edge length 1 with this many cells along each edge, its points moved by a function.
-fn moved_block(cells: usize, to: impl Fn(Point) -> Point) -> Mesh {
+pub(super) fn moved_block(cells: usize, to: impl Fn(Point) -> Point) -> Mesh {
     let mesh = block(&BlockParameters { size: [1.0; 3], cells: [cells, cells, 2] }).expect("a block");
     let points = mesh.points().iter().map(|&x| to(x)).collect();
     Mesh::new(Arc::clone(mesh.topology()), points).expect("no element is inverted")
 }
 
 /// The upper face becomes a part of the sphere of radius 2 about (0, 0, −1).
-fn cap(x: Point) -> Point {
+pub(super) fn cap(x: Point) -> Point {
     [x[0], x[1], x[2] * ((4.0 - x[0] * x[0] - x[1] * x[1]).sqrt() - 1.0)]
 }
 
 /// Outer faces on a named surface, oriented outwards.
-fn outward(mesh: &Mesh, name: &str) -> Vec<[NodeId; 3]> {
+pub(super) fn outward(mesh: &Mesh, name: &str) -> Vec<[NodeId; 3]> {
     let sorted = |mut nodes: [NodeId; 3]| {
         nodes.sort_unstable();
         nodes
@@ -45,7 +45,7 @@ fn outward(mesh: &Mesh, name: &str) -> Vec<[NodeId; 3]> {
 }
 
 /// The upper face of a block, cut by the planes x = 0 and y = 0.
-fn quarter(mesh: &Mesh, direction: Direction, control: Control) -> DesignSetup {
+pub(super) fn quarter(mesh: &Mesh, direction: Direction, control: Control) -> DesignSetup {
     let planes: Vec<_> = ["x_min", "y_min"].iter().flat_map(|name| outward(mesh, name)).collect();
     DesignSetup {
         control,
@@ -57,7 +57,7 @@ fn quarter(mesh: &Mesh, direction: Direction, control: Control) -> DesignSetup {
 
 const UP: Direction = Direction::Along([0.0, 0.0, 1.0]);
 
-fn build(mesh: &Mesh, setup: &DesignSetup) -> DesignSurface {
+pub(super) fn build(mesh: &Mesh, setup: &DesignSetup) -> DesignSurface {
     DesignSurface::new(mesh, setup).unwrap_or_else(|e| panic!("{e}"))
 }
 
@@ -99,6 +99,8 @@ fn the_gradient_is_the_transpose_of_the_displacement() {
         ..setup
     };
     let flat = moved_block(6, |x| x);
+    let edged = ["x_max", "z_max"].map(|name| outward(&flat, name)).concat();
+    let edged = DesignSetup { triangles: edged, ..quarter(&flat, Direction::Normal, Control::Filter(0.4)) };
     let surfaces = [
         plate_surface(&plate, None),
         plate_surface(&plate, Some([7, 13])),
@@ -106,6 +108,7 @@ fn the_gradient_is_the_transpose_of_the_displacement() {
         build(&curved, &quarter(&curved, Direction::Normal, Control::Nodes)),
         build(&curved, &quarter(&curved, Direction::Normal, Control::Grid([3, 4]))),
         build(&curved, &quarter(&curved, Direction::Normal, Control::Filter(0.4))),
+        build(&flat, &edged),
         build(&flat, &mirrored(quarter(&flat, UP, Control::Filter(0.4)))),
         build(&flat, &mirrored(quarter(&flat, UP, Control::Grid([4, 3])))),
     ];
