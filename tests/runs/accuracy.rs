@@ -441,10 +441,19 @@ fn what_impedance_surfaces_leave_out_is_said_of_objectives_and_bounds() {
     let warnings = solved["warnings"].to_string();
     assert!(warnings.contains(&warned) && warnings.contains("keeps its bound"), "{warned}: {warnings}");
 
-    let (ended, out) = of("run", &["--set", "optimizer.algorithm=slsqp", "--max-evaluations", "3"]);
-    ended.says(&["what impedance surfaces leave out", "and F/F0 from"]);
+    // The error bar of either design is 12 %.
+    let search =
+        ["--set", "optimizer.algorithm=slsqp", "--set", "accuracy.tolerance=0.2", "--max-evaluations", "3"];
+    let (ended, out) = of("run", &search);
+    ended.says(&[
+        "changes the objective by about +11.55 % at the initial",
+        "and F/F0 from",
+        "% and what impedance surfaces leave out 11.545 % for the initial design",
+        "no refinement takes that away, but meshing the regions that are surfaces",
+    ]);
     let run = read_json(&out.join("result.json"));
     assert_eq!(run["accuracy"]["excess"][0], solved["accuracy"]["excess"][0]);
+    assert_eq!(run["accuracy"]["within_tolerance"], false);
     let [first, last] = [0, 1].map(|k| number(&run, &format!("/accuracy/excess/{k}")));
     let [initial, best] = ["/objective/initial", "/objective/best"].map(|key| number(&run, key));
     println!("of {initial:.2} and {best:.2} W: {first:.3} and {last:.3}");

@@ -56,9 +56,13 @@ fn walls_are_known_by_where_they_are() {
     let sides = "boundaries.flux_parallel=[\"x_min\", \"y_min\", \"x_max\", \"y_max\", \"z_max\"]";
     let lone = wall(&[sides, "boundaries.flux_normal=[\"z_min\"]"]);
     assert!(lone.0 != "z_min" && lone.1 > named.1, "{lone:?} in place of {named:?}");
-    let probe = "probes=[{name = \"far\", points = [[\"0 mm\", \"0 mm\", \"-380 mm\"]]}]";
-    let observed = wall(&[probe]);
+    let with_probe = |height: &str| {
+        wall(&[&format!("probes=[{{name = \"far\", points = [[\"0 mm\", \"0 mm\", \"{height}\"]]}}]")])
+    };
+    let observed = with_probe("-380 mm");
     assert!(observed.0 == "z_min" && (0.015..0.025).contains(&observed.1), "{observed:?}");
+    // In a plane at which something is observed the device goes on behind it.
+    assert_ne!(with_probe("-400 mm").0, "z_min");
 }
 
 /// The field is left normal to it, as to a flux-normal one.

@@ -309,9 +309,20 @@ fn optimisation_warnings(config: &Config, constraints: &[Constraint], mode: Mode
     warnings
 }
 
-/// Refuses an initial design of which the mesh carries a part alone; on several ranks once all of them are set up, which move it
-/// together.
-pub(crate) fn check_initial_design(source: &SourceMap, (shape, mesh): (&Shape, &Mesh)) -> Result<(), Error> {
+/// Refuses on the first of several ranks what [`set_up_watched`] refuses on one process: they move the mesh together, once all are
+/// set up.
+///
+/// # Errors
+/// [`Error::Config`] for an initial design of which the mesh carries a part alone.
+pub(crate) fn check_on_ranks(setup: &Setup, source: &SourceMap) -> Result<(), Error> {
+    match (setup.problem.share(), setup.problem.shape()) {
+        (Some(_), Some(shape)) => check_initial_design(source, (shape, setup.problem.original())),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses an initial design of which the mesh carries a part alone.
+fn check_initial_design(source: &SourceMap, (shape, mesh): (&Shape, &Mesh)) -> Result<(), Error> {
     let initial = shape.initial();
     if initial.iter().all(|&p| p == 0.0) {
         return Ok(());

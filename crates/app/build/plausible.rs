@@ -17,7 +17,7 @@ use super::entries::material;
 use super::references::functionals;
 use super::soundness::{faces_of, faces_without_condition};
 use crate::config::{
-    Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, MeshConfig,
+    Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, LoadCase, MeshConfig,
     ObjectiveKind, RegionModel, SourceMap,
 };
 
@@ -132,22 +132,7 @@ pub(super) fn warnings(
     let mut warnings: Vec<String> = Vec::new();
     warnings.extend(wave_warning(config, mesh));
     warnings.extend(overlap_warnings(config, coils));
-    for (i, coil) in config.coils.iter().enumerate() {
-        if let Some(twin) = config.coils[..i].iter().find(|earlier| earlier.shape == coil.shape) {
-            warnings.push(format!(
-                "the coils `{}` and `{}` are the same winding at the same place: their ampere-turns add up",
-                twin.name, coil.name
-            ));
-        } else if let Some((twin, region)) =
-            config.coils[..i].iter().find_map(|own| Some((own, common_region(own, coil)?)))
-        {
-            warnings.push(format!(
-                "the currents of the coils `{}` and `{}` fill the same region `{region}`: they add up, and cancel where they are \
-                 opposite; of two conductors each is a region of its own",
-                twin.name, coil.name
-            ));
-        }
-    }
+    warnings.extend((0..config.coils.len()).filter_map(|i| twin_warning(config, i)));
     if config.boundaries.is_empty() && !open_patches.is_empty() {
         warnings.push(
             "no surface has a condition in [boundaries]: at all of them the field is left normal to the surface, as in \
@@ -205,6 +190,30 @@ fn wave_warning(config: &Config, mesh: &Mesh) -> Option<String> {
              displacement currents, which are left out, are no longer small there"
         )
     })
+}
+
+/// What to say of a coil whose current flows where that of an earlier one does, at the same time.
+fn twin_warning(config: &Config, i: usize) -> Option<String> {
+    let coil = &config.coils[i];
+    let is_fed = |case: &LoadCase<'_>, coil: &Coil| {
+        let feed = case.feed(coil);
+        feed.by_voltage || feed.amplitude != 0.0
+    };
+    let flows_beside =
+        |own: &&Coil| config.load_cases().iter().any(|case| is_fed(case, own) && is_fed(case, coil));
+    let earlier = || config.coils[..i].iter().filter(flows_beside);
+    if let Some(twin) = earlier().find(|own| own.shape == coil.shape) {
+        return Some(format!(
+            "the coils `{}` and `{}` are the same winding at the same place: their ampere-turns add up",
+            twin.name, coil.name
+        ));
+    }
+    let (twin, region) = earlier().find_map(|own| Some((own, common_region(own, coil)?)))?;
+    Some(format!(
+        "the currents of the coils `{}` and `{}` fill the same region `{region}`: they add up, and cancel where they are opposite; of \
+         two conductors each is a region of its own",
+        twin.name, coil.name
+    ))
 }
 
 /// The region that the currents of two coils fill.

@@ -1,8 +1,8 @@
 //! How far the walls of the mesh are from what makes and bends the field, and from where it is observed: what they cut off is not
 //! computed.
 //!
-//! Walls are the sides of the mesh, whatever their names and conditions. A side that coils or matter reach is a plane of symmetry; so is
-//! a plane one that flux passes at a right angle, unless it has such a side, or one that is reached, opposite.
+//! Walls are the sides of the mesh, whatever their names and conditions, but planes of symmetry: those that coils, matter or what is
+//! observed reach; and those that flux passes at a right angle, unless such a plane, or one that is reached, lies opposite.
 
 use std::collections::HashSet;
 
@@ -41,8 +41,11 @@ const ROUNDING: f64 = 1e-9;
 /// The nearest wall that no coil, magnet, conductor or iron reaches.
 #[derive(Debug, Serialize)]
 pub(crate) struct Truncation {
-    /// Its surface; of a side without a name the region behind it and a place.
+    /// Its surface; of a side without a name what it bounds.
     pub(crate) surface: String,
+    /// Where a side without a name is [m].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) at_m: Option<Point>,
     /// To it from the box around coils and matter, or from a place that is observed [m].
     pub(crate) distance_m: f64,
     /// Half the diagonal of the box around all of these, with what planes of symmetry cut off [m].
@@ -52,33 +55,44 @@ pub(crate) struct Truncation {
     near: f64,
 }
 
+/// What a side of the mesh may stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Standing {
+    /// A wall.
+    Wall,
+    /// A plane without a condition, which flux passes at a right angle.
+    Free,
+    /// A plane of `flux_normal`.
+    Normal,
+    /// A plane that coils, matter or what is observed reach: one of symmetry.
+    Reached,
+}
+
 /// A side of the mesh.
 struct Side {
     patch: OpenPatch,
     /// Its nodes, each at least once.
     nodes: Vec<NodeId>,
     /// Whether coils or matter reach it.
-    is_reached: bool,
-    /// Whether it is plane, and flux passes it at a right angle.
-    is_mirror: bool,
+    has_matter: bool,
+    standing: Standing,
 }
 
 impl Side {
-    /// Whether it is plane.
-    fn is_plane(patch: &OpenPatch) -> bool {
-        norm(patch.area_vector) >= PLANE * patch.area
-    }
-
-    /// Whether it may be a plane of symmetry that has the other one opposite.
-    fn faces(&self, other: &Self) -> bool {
-        let cosine =
-            dot(self.patch.area_vector, other.patch.area_vector) / (self.patch.area * other.patch.area);
-        cosine < OPPOSITE && (other.is_reached && Self::is_plane(&other.patch) || other.is_mirror)
+    /// Whether it is a wall beside these, one of which may be itself.
+    fn is_wall(&self, all: &[Self]) -> bool {
+        let Self { patch, standing, .. } = self;
+        let is_opposite = |other: &&Self| {
+            dot(patch.area_vector, other.patch.area_vector) < OPPOSITE * patch.area * other.patch.area
+        };
+        let is_free = !matches!(standing, Standing::Wall | Standing::Reached);
+        let has_opposite = all.iter().filter(is_opposite).any(|other| other.standing >= *standing);
+        !self.has_matter && (*standing == Standing::Wall || is_free && has_opposite)
     }
 }
 
 impl Truncation {
-    /// Of the first state; `None` where space is open, or nothing is cut off.
+    /// Of the first state; `None` where space is open, and where no coil and no matter is there or nothing is cut off.
     pub(crate) fn of(config: &Config, setup: &Setup) -> Option<Self> {
         let (model, mesh) = (setup.problem.states().first()?, setup.problem.original());
         if model.setup().open.is_some() {
@@ -89,53 +103,74 @@ impl Truncation {
         // A conductor that its surface replaces is matter too.
         let replaced = model.conductors().iter().flat_map(|conductor| conductor.surface.iter().flatten());
         points.extend(replaced.map(|&n| mesh.point(n)));
-        let sources = AxisBox::around(&points);
-        let observed = observed(config, mesh);
+        if points.is_empty() {
+            return None;
+        }
+        let (sources, observed) = (AxisBox::around(&points), observed(config, mesh));
         let hull = Hull::new(mesh);
-        let sides = sides(&hull, model, &sources);
+        let sides = sides(&hull, model, (&sources, &observed));
         let distance = |side: &Side| {
             let to = |from: &AxisBox| {
                 side.nodes.iter().map(|&n| from.square_distance(mesh.point(n))).fold(f64::INFINITY, f64::min)
             };
             observed.iter().map(to).fold(to(&sources), f64::min).sqrt()
         };
-        let is_wall = |side: &&Side| {
-            !side.is_reached && (!side.is_mirror || sides.iter().any(|other| side.faces(other)))
-        };
-        let walls = sides.iter().filter(is_wall).map(|side| (side, distance(side)));
-        let (side, distance_m) = walls.filter(|own| own.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let walls = sides.iter().filter(|side| side.is_wall(&sides)).map(|side| (side, distance(side)));
+        let (side, distance_m) = walls.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let (source_size_m, near) = size(mesh, &sources, &observed);
-        Some(Self { surface: name(&hull, side), distance_m, source_size_m, near })
+        let (surface, at_m) = name(&hull, side);
+        Some(Self { surface, at_m, distance_m, source_size_m, near })
+    }
+
+    /// Its name in marks or not, with the place of a side that has none.
+    pub(crate) fn named(&self, mark: &str) -> String {
+        let place = self.at_m.map_or(String::new(), |place| format!(" at {}", millimetres(place)));
+        format!("{mark}{}{mark}{place}", self.surface)
     }
 
     /// What no error bar counts, where the wall is near.
     pub(crate) fn described(&self) -> Option<String> {
-        let Self { surface, distance_m, source_size_m, near } = self;
+        let Self { distance_m, source_size_m, near, .. } = self;
         let ratio = distance_m / source_size_m;
         (ratio < *near).then(|| {
             format!(
-                "the wall `{surface}` is {:.3} mm from coils, matter and what is observed, {ratio:.1} times their half diagonal: where it \
-                 stands for open space, no error bar counts what it cuts off; walls farther off show how much that is",
+                "the wall {} is {:.3} mm from coils, matter and what is observed, {ratio:.1} times their half diagonal: where it stands \
+                 for open space, no error bar counts what it cuts off; walls farther off show how much that is",
+                self.named("`"),
                 Millimetres(*distance_m)
             )
         })
     }
 }
 
-/// The sides of a mesh, of which some reach into the box of coils and matter.
-fn sides(hull: &Hull<'_>, model: &FieldModel, sources: &AxisBox) -> Vec<Side> {
+/// The sides of a mesh, and which of them coils and matter reach, or what is observed.
+fn sides(hull: &Hull<'_>, model: &FieldModel, (sources, observed): (&AxisBox, &[AxisBox])) -> Vec<Side> {
     let (mesh, faces) = (hull.mesh(), hull.faces());
-    let others = model.setup().boundaries.iter().filter(|own| own.1 != Boundary::FluxNormal);
-    let others = faces_of(mesh.topology(), others.map(|own| own.0.as_str()));
+    let rounding = ROUNDING * diagonal(mesh);
+    let boundaries = &model.setup().boundaries;
+    let with = |is: &dyn Fn(Boundary) -> bool| {
+        let names = boundaries.iter().filter(|own| is(own.1)).map(|own| own.0.as_str());
+        faces_of(mesh.topology(), names)
+    };
+    let normal = with(&|own| own == Boundary::FluxNormal);
+    let others = with(&|own| own != Boundary::FluxNormal);
     let of = |patch: OpenPatch| {
-        let nodes: Vec<NodeId> = patch.faces.iter().flat_map(|&face| faces[face].nodes).collect();
-        let is_normal = |face: &usize| !others.contains(&face_key(faces[*face].nodes));
-        Side {
-            is_reached: nodes.iter().any(|&n| sources.contains(mesh.point(n))),
-            is_mirror: Side::is_plane(&patch) && patch.faces.iter().all(is_normal),
-            nodes,
-            patch,
-        }
+        let is_reached = |from: &AxisBox| {
+            let of_face = |&face: &usize| AxisBox::around(&hull.corners(face)).grown(rounding).meets(from);
+            patch.faces.iter().any(of_face)
+        };
+        let all = |of: &HashSet<_>| patch.faces.iter().all(|&face| of.contains(&face_key(faces[face].nodes)));
+        let any = |of: &HashSet<_>| patch.faces.iter().any(|&face| of.contains(&face_key(faces[face].nodes)));
+        let has_matter = is_reached(sources);
+        let standing = match norm(patch.area_vector) >= PLANE * patch.area {
+            false => Standing::Wall,
+            true if has_matter || observed.iter().any(is_reached) => Standing::Reached,
+            true if all(&normal) => Standing::Normal,
+            true if any(&others) => Standing::Wall,
+            true => Standing::Free,
+        };
+        let nodes = patch.faces.iter().flat_map(|&face| faces[face].nodes).collect();
+        Side { has_matter, standing, nodes, patch }
     };
     let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
     let replaced: HashSet<_> = replaced.map(|triangle| face_key(*triangle)).collect();
@@ -143,20 +178,32 @@ fn sides(hull: &Hull<'_>, model: &FieldModel, sources: &AxisBox) -> Vec<Side> {
     open_patches(hull, &is_matter).into_iter().map(of).collect()
 }
 
-/// What a side is called.
-fn name(hull: &Hull<'_>, side: &Side) -> String {
+/// What a side is called; of one without a name with a place.
+fn name(hull: &Hull<'_>, side: &Side) -> (String, Option<Point>) {
     let topology = hull.mesh().topology();
     let first = face_key(hull.faces()[side.patch.faces[0]].nodes);
     let holds = |name: &&str| {
         topology.surface(name).is_ok_and(|triangles| triangles.iter().any(|t| face_key(*t) == first))
     };
     match topology.surface_names().find(holds) {
-        Some(name) => name.to_owned(),
+        Some(name) => (name.to_owned(), None),
         None => {
             let region = &topology.region_names()[side.patch.region.index()];
-            format!("{region}|outside` at `{}", millimetres(side.patch.place))
+            (format!("{region}|outside"), Some(side.patch.place))
         }
     }
+}
+
+/// Length from corner to corner of a mesh [m].
+fn diagonal(mesh: &Mesh) -> f64 {
+    let [lower, upper] = mesh.bounding_box();
+    norm(sub(upper, lower))
+}
+
+/// In which directions a box reaches the least and the greatest coordinates of a mesh.
+fn cuts(mesh: &Mesh, own: &AxisBox) -> [[bool; 2]; 3] {
+    let ([lower, upper], rounding) = (mesh.bounding_box(), ROUNDING * diagonal(mesh));
+    [0, 1, 2].map(|d| [own.lower[d] <= lower[d] + rounding, own.upper[d] >= upper[d] - rounding])
 }
 
 /// Half the diagonal of the box around all that makes, bends and observes the field, with what planes of symmetry cut off [m], and in
@@ -164,20 +211,17 @@ fn name(hull: &Hull<'_>, side: &Side) -> String {
 fn size(mesh: &Mesh, sources: &AxisBox, observed: &[AxisBox]) -> (f64, f64) {
     let all = observed.iter().fold(*sources, |all, own| all.with(own));
     // What a plane of symmetry cuts goes on behind it.
-    let [lower, upper] = mesh.bounding_box();
-    let rounding = ROUNDING * norm(sub(upper, lower));
-    let cuts =
-        [0, 1, 2].map(|d| [sources.lower[d] <= lower[d] + rounding, sources.upper[d] >= upper[d] - rounding]);
+    let of_all = cuts(mesh, &all);
     let whole = |d: usize| {
         let own = all.upper[d] - all.lower[d];
-        if cuts[d][0] != cuts[d][1] { 2.0 * own } else { own }
+        if of_all[d][0] != of_all[d][1] { 2.0 * own } else { own }
     };
-    let near = if cuts.contains(&[true, true]) { NEAR_IN_A_PLANE } else { NEAR };
-    (0.5 * norm([0, 1, 2].map(whole)), near)
+    let is_plane = cuts(mesh, sources).contains(&[true, true]);
+    (0.5 * norm([0, 1, 2].map(whole)), if is_plane { NEAR_IN_A_PLANE } else { NEAR })
 }
 
 /// The places at which B is observed: the boxes around regions and expansions, as far as they lie in the mesh, and the points of
-/// probes.
+/// probes. A region that fills the mesh is no place.
 fn observed(config: &Config, mesh: &Mesh) -> Vec<AxisBox> {
     let topology = mesh.topology();
     let is_of_places = |kind: ObjectiveKind| {
@@ -196,7 +240,8 @@ fn observed(config: &Config, mesh: &Mesh) -> Vec<AxisBox> {
         lower: std::array::from_fn(|d| (set.center[d] - set.radius).clamp(lower[d], upper[d])),
         upper: std::array::from_fn(|d| (set.center[d] + set.radius).clamp(lower[d], upper[d])),
     });
-    of_regions.chain(of_probes).chain(of_expansions).collect()
+    let is_place = |own: &AxisBox| cuts(mesh, own) != [[true; 2]; 3];
+    of_regions.chain(of_probes).chain(of_expansions).filter(is_place).collect()
 }
 
 /// Elements of windings and conductors, or that are not air.
@@ -231,6 +276,7 @@ mod tests {
     fn a_wall_is_near_within_three_half_diagonals_and_farther_beside_a_plane_device() {
         let at = |distance_m: f64, near| Truncation {
             surface: "x_max".to_owned(),
+            at_m: None,
             distance_m,
             source_size_m: 0.1,
             near,

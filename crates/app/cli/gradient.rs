@@ -5,7 +5,7 @@ use fluxmorph_optimizer::verify::{Certificate, Certificates, Settings, certify};
 use super::args::GradientArgs;
 use super::ranks::on_all;
 use super::{interrupt, stdout};
-use crate::build::{Mode, memory_limit, set_up_watched};
+use crate::build::{Mode, check_on_ranks, memory_limit, set_up_watched};
 use crate::config::FactorReuse;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
@@ -24,6 +24,7 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
         let progress = &mut |stage| observer.stage(stage);
         let setup = set_up_watched(&config, &source, Mode::Optimisation, options.ranks, progress)?;
         memory_limit::check_problem(&setup.problem, &source, options.overwrite_policy)?;
+        check_on_ranks(&setup, &source)?;
         for warning in &setup.warnings {
             observer.warning(warning);
         }

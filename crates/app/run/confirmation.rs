@@ -343,8 +343,11 @@ fn kept(
             Kept::ButForUnrefined if of_surfaces == [0.0; 2] => {
                 "; no refinement takes the facets away, but a mesh with smaller faces there"
             }
+            Kept::ButForUnrefined if of_facets == [0.0; 2] => {
+                "; no refinement takes that away, but meshing the regions that are surfaces"
+            }
             Kept::ButForUnrefined => {
-                "; no refinement takes that away: mesh the regions that are surfaces, begin with smaller faces where they are curved"
+                "; no refinement takes that away, but meshing the regions that are surfaces, with smaller faces where they are curved"
             }
             _ => "",
         };

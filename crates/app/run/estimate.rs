@@ -37,14 +37,18 @@ fn is_asked_for(config: &Config) -> bool {
     config.accuracy.estimate.is_some() || config.accuracy.tolerance.is_some()
 }
 
-/// Bytes that the process holds at the peak of an estimate, about; `None` where none is wanted.
-pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
+/// Whether an estimate is wanted, be it possible or not.
+fn is_wanted(config: &Config, problem: &Problem) -> bool {
     let is_second_order = config.analysis.order == ElementOrder::Quadratic;
     let has_bound = problem.constraints().iter().any(|own| own.quantity.is_of_field());
     let is_of_something =
         problem.objective().is_some() || has_bound || reported::is_something(config, problem);
-    let is_wanted = config.accuracy.estimate != Some(false) && is_of_something;
-    if !is_wanted || problem.share().is_some() || is_second_order && !is_asked_for(config) {
+    config.accuracy.estimate != Some(false) && is_of_something && (!is_second_order || is_asked_for(config))
+}
+
+/// Bytes that the process holds at the peak of an estimate, about; `None` where there is none.
+pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
+    if problem.share().is_some() || !is_wanted(config, problem) {
         return None;
     }
     let sizes = Sizes::of(problem);
@@ -52,7 +56,7 @@ pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
     let tangent = if has_curve { TANGENT_BYTES_PER_TET } else { 0 };
     let [edge, nodal] = ESTIMATE_BYTES.map(|[all, eddy]| [all + tangent, eddy]);
     Some(match config.analysis.elements {
-        _ if is_second_order => sizes.on_other_mesh(8.0)[0],
+        _ if config.analysis.order == ElementOrder::Quadratic => sizes.on_other_mesh(8.0)[0],
         Elements::Edge => sizes.beside(edge),
         Elements::Nodal => sizes.beside(nodal),
     })
@@ -115,7 +119,7 @@ impl<'a> Estimator<'a> {
     }
 
     fn estimated(&mut self, of: Of, analysis: &Analysis, observer: &mut dyn Observer) -> Option<Estimate> {
-        if self.problem.share().is_some() && self.config.accuracy.estimate != Some(false) {
+        if self.problem.share().is_some() && is_wanted(self.config, self.problem) {
             return left_out("that takes one process", observer);
         }
         if let Some(shortage) = memory_limit::shortage(memory(self.config, self.problem)?) {

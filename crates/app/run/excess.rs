@@ -9,11 +9,12 @@ use fluxmorph_geometry::Readable;
 use fluxmorph_optimizer::constraint::{Bound, Quantity};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_solver::FieldModel;
 use fluxmorph_solver::audit::{ExcessLoss, excess_losses};
+use fluxmorph_solver::circuit::currents;
+use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use super::Session;
-use super::reservations::under;
+use super::reported::under;
 use crate::config::ObjectiveKind;
 use crate::show::Observer;
 
@@ -50,23 +51,51 @@ pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<Strin
     worst.values().map(text).collect()
 }
 
-/// What impedance surfaces leave out of the losses of a design, in each state by region [W].
-pub(super) struct LeftOut(Vec<HashMap<String, f64>>);
+/// What impedance surfaces leave out of the losses of a design, in each state.
+pub(super) struct LeftOut(Vec<OfState>);
+
+/// What they leave out of one state.
+struct OfState {
+    /// Of losses, by region [W].
+    losses: HashMap<String, f64>,
+    /// The current of the one coil, where all losses are its [A].
+    current: Option<f64>,
+}
+
+impl OfState {
+    /// What a quantity of this kind has more, of a region or of a coil; `None` where it has no loss of a surface.
+    fn more(&self, kind: &str, region: Option<&String>) -> Option<f64> {
+        let is = |own: ObjectiveKind| kind == own.name();
+        let all = || self.losses.values().copied().reduce(|a, b| a + b);
+        let squared = self.current.map(|current| current * current).filter(|squared| *squared > 0.0);
+        match region {
+            Some(region) if is(ObjectiveKind::Loss) => self.losses.get(region).copied(),
+            _ if is(ObjectiveKind::Power) && squared.is_some() => all(),
+            _ if is(ObjectiveKind::Resistance) => Some(2.0 * all()? / squared?),
+            _ => None,
+        }
+    }
+}
 
 impl LeftOut {
     /// That of an analysis.
     pub(super) fn of(problem: &Problem, analysis: &Analysis) -> Self {
-        let of_state = |(model, solution)| {
+        let of_state = |(model, solution): (&FieldModel, &FieldSolution)| {
             let found = excess_losses(model, &analysis.mesh, solution).into_iter();
-            found.map(|own| (own.region, own.at_edges + own.of_curvature)).collect()
+            let losses = found.map(|own| (own.region.clone(), own.more())).collect();
+            let current = match &currents(model, solution)[..] {
+                [(_, current)] if model.coils().len() == 1 => Some(current.norm()),
+                _ => None,
+            };
+            OfState { losses, current }
         };
         Self(problem.states().iter().zip(&analysis.solutions).map(of_state).collect())
     }
 
-    /// What a term has more, about [W]; `None` where it is no loss of an impedance surface.
+    /// What a term has more, about [its unit]; `None` where it has no loss of an impedance surface.
     fn of_term(&self, term: &Term) -> Option<f64> {
-        let region = term.label.region.as_ref().filter(|_| term.label.kind == ObjectiveKind::Loss.name())?;
-        term.states.iter().filter_map(|&state| self.0[state].get(region)).copied().reduce(|a, b| a + b)
+        let of = |&state: &usize| self.0[state].more(term.label.kind, term.label.region.as_ref());
+        term.states.iter().filter_map(of).reduce(|a, b| a + b)
     }
 
     /// What the objective of the analysis has more, about [its unit]; `None` where it has no loss of an impedance surface.
@@ -75,7 +104,7 @@ impl LeftOut {
         Some(problem.objective_has_more(analysis, |term| self.of_term(term).unwrap_or(0.0)))
     }
 
-    /// What each constraint on the loss of an impedance surface has more, with its number [W].
+    /// What each constraint on what has a loss of an impedance surface has more, with its number [its unit].
     fn of_constraints(&self, problem: &Problem) -> impl Iterator<Item = (usize, f64)> {
         problem.constraints().iter().enumerate().filter_map(|(k, constraint)| match &constraint.quantity {
             Quantity::Field(term) => Some((k, self.of_term(term)?)),
@@ -83,8 +112,8 @@ impl LeftOut {
         })
     }
 
-    /// Bounds on losses that are kept by the surfaces alone, in words; those that are shares of what the initial design has by what
-    /// that leaves out.
+    /// Bounds that are kept by the losses of the surfaces alone, in words; those that are shares of what the initial design has where
+    /// it is known what that leaves out.
     pub(super) fn broken_bounds(
         &self,
         problem: &Problem,
@@ -140,11 +169,11 @@ impl Session<'_> {
 /// What impedance surfaces leave out of the objective of the initial and of the best design, in words; `None` where it is hardly
 /// anything.
 pub(super) fn described([at_initial, at_best]: [f64; 2], [initial, best]: [f64; 2]) -> Option<String> {
-    let [first, last] = [at_initial / initial.abs(), at_best / initial.abs().max(best.abs())];
+    let [first, last] = [at_initial / initial.abs(), at_best / best.abs()];
     (first.abs().max(last.abs()) > UNSAID).then(|| {
         format!(
             "what impedance surfaces leave out, at sharp edges and where they are round, changes the objective by about {:+.2} % at \
-             the initial and {:+.2} % at the best design, relative to the larger of both, and F/F0 from {:.5} to {:.5}, which no \
+             the initial and {:+.2} % at the best design, of what it is there, and F/F0 from {:.5} to {:.5}, which no \
              error bar and no mesh counts; where that matters, mesh these regions (model = \"volume\")",
             100.0 * first,
             100.0 * last,
@@ -152,4 +181,31 @@ pub(super) fn described([at_initial, at_best]: [f64; 2], [initial, best]: [f64; 
             (best + at_best) / (initial + at_initial)
         )
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_out_is_of_losses_and_of_what_one_coil_sees_of_them() {
+        let losses = HashMap::from([("plate".to_owned(), 3.0), ("wall".to_owned(), 1.0)]);
+        let mut state = OfState { losses, current: Some(4.0) };
+        let plate = "plate".to_owned();
+        assert_eq!(state.more("loss", Some(&plate)), Some(3.0));
+        assert_eq!(state.more("loss", Some(&"meshed".to_owned())), None);
+        assert_eq!(state.more("power", None), Some(4.0));
+        assert_eq!(state.more("resistance", None), Some(0.5), "2 P / I²");
+        assert_eq!(state.more("energy", Some(&plate)), None);
+        state.current = None;
+        assert_eq!(state.more("resistance", None), None, "of several coils nothing is known");
+    }
+
+    #[test]
+    fn what_is_left_out_is_said_beyond_a_hundredth_of_either_design() {
+        let text = described([1.0, 4.0], [-100.0, 50.0]).expect("of the best");
+        assert!(text.contains("+1.00 % at the initial and +8.00 % at the best"), "{text}");
+        assert!(text.contains("from -0.50000 to -0.54545"), "{text}");
+        assert_eq!(described([0.9, -0.4], [100.0, 50.0]), None);
+    }
 }

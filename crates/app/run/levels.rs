@@ -102,11 +102,6 @@ impl<'a> Levels<'a> {
         }))
     }
 
-    /// Whether the run had refined its mesh before it was interrupted.
-    pub(super) fn has_kept(&self) -> bool {
-        !self.kept.refinements.is_empty()
-    }
-
     /// Of every node that the mesh of the configuration does not have, the two in whose middle it lies.
     pub(super) fn parents(&self) -> &[[NodeId; 2]] {
         self.mesh.parents()

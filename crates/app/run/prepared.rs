@@ -7,7 +7,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 
 use super::facets::FirstFacets;
 use super::{Options, Session, mesh_hash, table_hashes};
-use crate::build::{Mode, Setup, Truncation, check_initial_design, memory_limit, set_up_watched};
+use crate::build::{Mode, Setup, Truncation, check_on_ranks, memory_limit, set_up_watched};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::files::{LimitsInForce, Manifest, MeshHash, RunDirectory, surface_files};
@@ -39,9 +39,7 @@ impl<'a> Prepared<'a> {
         let setup = set_up_watched(config, source, mode, options.ranks, stages)?;
         memory_limit::check_problem(&setup.problem, source, options.overwrite_policy)?;
         OptimizerError::check_interrupted(options.interrupted)?;
-        if let (Some(_), Some(shape)) = (setup.problem.share(), setup.problem.shape()) {
-            check_initial_design(source, (shape, setup.problem.original()))?;
-        }
+        check_on_ranks(&setup, source)?;
         let facets = FirstFacets::of(config, &setup.full_mesh);
         let near_wall = Truncation::of(config, &setup).and_then(|truncation| truncation.described());
         Ok(Self { setup, config, source, facets, near_wall, options, clock })

@@ -32,6 +32,11 @@ pub(super) fn is_something(config: &Config, problem: &Problem) -> bool {
         || problem.states().iter().any(has_losses)
 }
 
+/// The load of a state, behind what is said of it.
+pub(super) fn under(model: &FieldModel) -> String {
+    model.setup().load_case.as_ref().map_or(String::new(), |load| format!(" under the load `{load}`"))
+}
+
 /// What a state reports, by names.
 pub(super) struct Reported {
     losses: Vec<(String, f64)>,

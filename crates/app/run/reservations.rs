@@ -14,6 +14,7 @@ use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
 use super::excess;
+use super::reported::under;
 use crate::build::{
     Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, result_warnings, skin_warnings,
 };
@@ -98,11 +99,6 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
             })
         })
         .collect()
-}
-
-/// The load of a state, behind what is said of it.
-pub(super) fn under(model: &FieldModel) -> String {
-    model.setup().load_case.as_ref().map_or(String::new(), |load| format!(" under the load `{load}`"))
 }
 
 /// Skin audits of iron with a B–H curve, of the permeability that the fields leave at its surface.

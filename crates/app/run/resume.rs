@@ -105,8 +105,8 @@ pub(crate) fn resume_held(
         },
     )?;
     let mut session = prepared.session("run", directory.clone(), manifest);
-    let contents = journal(&directory, (&session.identity(), &config), observer)?;
     session.check_levels()?;
+    let contents = journal(&directory, (&session.identity(), &config), observer)?;
     session.note_resumption(contents.as_ref().map_or(0, |contents| contents.records.len()), options);
     session.announce(observer);
     directory.make_fields()?;

@@ -149,8 +149,8 @@ impl<'a> Session<'a> {
 
     /// Refuses to go on with a refined mesh on several ranks.
     pub(super) fn check_levels(&self) -> Result<(), Error> {
-        let is_shared = self.setup.problem.share().is_some();
-        if is_shared && Levels::of(self)?.is_some_and(|levels| levels.has_kept()) {
+        let has_kept = || Refinements::read(&self.directory).map(|own| !own.refinements.is_empty());
+        if self.setup.problem.share().is_some() && has_kept()? {
             let path: PathBuf = self.directory.path().to_owned();
             let cause = "its mesh was refined, which takes one process: resume it without ranks".to_owned();
             return Err(Error::NotResumable { path, cause });

@@ -159,7 +159,7 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Option<Accuracy> {
         let estimate = estimate.filter(|_| analysis.objective.is_some());
-        if estimate.is_none() && !self.is_geometry_looked_at() {
+        if estimate.is_none() && excess.is_none() && !self.is_geometry_looked_at() {
             return None;
         }
         let objective = analysis.objective.filter(|_| self.has_field_objective());

@@ -211,7 +211,8 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ));
     }
     rows.extend(accuracy.verdict.map(|verdict| {
-        let style = if verdict == Verdict::Confirmed { styles.good } else { styles.bad };
+        let is_good = verdict == Verdict::Confirmed && !accuracy.hides_gain(*ratio);
+        let style = if is_good { styles.good } else { styles.bad };
         let opinions = [
             objective.verification.is_some(),
             accuracy.cross_check.as_ref().is_some_and(|check| !check.by_estimate),
@@ -219,8 +220,8 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ];
         let alone = opinions.iter().filter(|is_there| **is_there).count() == 1;
         let remark = if alone { " (by one check alone)" } else { "" };
-        let small = if accuracy.hides_gain(*ratio) { ", but smaller than its error bar" } else { "" };
-        ("gain", format!("{}{small}{remark}", styled(style, verdict.describe())))
+        let text = accuracy.describe_gain(*ratio).unwrap_or_default();
+        ("gain", format!("{}{remark}", styled(style, &text)))
     }));
     rows
 }

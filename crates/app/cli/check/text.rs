@@ -132,7 +132,7 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
             "nearest wall",
             format!(
                 "{}: {distance} mm from coils, matter and what is observed, {times:.1} times their half diagonal {size} mm; [open] takes walls away",
-                wall.surface
+                wall.named("")
             ),
         );
     }

@@ -33,7 +33,7 @@ table! {
         /// the curve is a smooth monotone cubic, beyond the last one its slope is that of vacuum.
         bh: Option<WrittenCurve> = ONE_OF;
         /// The same from a file, relative to the folder of the configuration: on each line H [A/m] and B [T], with a comma between
-        /// them; lines that begin with `#` are comments. Instead of `bh`.
+        /// them; lines that begin with `#` are comments, and the file has at most 1 MiB. Instead of `bh`.
         bh_file: Option<PathBuf> = TEXT;
         /// Polarisation B − μ0 H at which iron is saturated [T]: a curve in closed form, of which `relative_permeability` is the
         /// initial permeability. Instead of `bh`.

@@ -102,6 +102,7 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
 /// Whether the gain is the shape's, with the error bar; `None` where nothing says so.
 fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
     let verdict = match accuracy.verdict? {
+        Verdict::Confirmed if accuracy.hides_gain(objective.ratio) => "smaller than its error bar",
         Verdict::Confirmed => "confirmed",
         Verdict::NotConfirmed => "NOT CONFIRMED",
     };
@@ -122,8 +123,8 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
         .as_ref()
         .map(|facets| format!("facets up to {} mm off {}", number(1e3 * facets.off_m, 2), facets.surface));
     let excess = accuracy.excess.map(|[initial, best]| {
-        let without = (objective.best + best) / (objective.initial + initial);
-        format!("{} with what impedance surfaces leave out of losses", ticks::ratio(without))
+        let with_all = (objective.best + best) / (objective.initial + initial);
+        format!("{} with what impedance surfaces leave out of losses", ticks::ratio(with_all))
     });
     let remark: Vec<String> = [bar, other, refined, facets, excess].into_iter().flatten().collect();
     Some(("gain", verdict.to_owned(), remark.join("; ")))

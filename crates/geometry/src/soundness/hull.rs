@@ -37,7 +37,7 @@ impl<'m> Hull<'m> {
     }
 
     /// The corners of a face [m].
-    pub(super) fn corners(&self, face: usize) -> [Point; 3] {
+    pub fn corners(&self, face: usize) -> [Point; 3] {
         self.faces[face].nodes.map(|n| self.mesh.point(n))
     }
 

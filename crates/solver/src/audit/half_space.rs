@@ -81,9 +81,14 @@ pub struct ExcessLoss {
 }
 
 impl ExcessLoss {
-    /// What the conductor has more, over the loss of its surface.
+    /// What the conductor has more, about [W].
+    pub fn more(&self) -> f64 {
+        self.at_edges + self.of_curvature
+    }
+
+    /// The same over the loss of its surface.
     pub fn share(&self) -> f64 {
-        (self.at_edges + self.of_curvature) / self.of_surface
+        self.more() / self.of_surface
     }
 }
 
