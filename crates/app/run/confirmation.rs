@@ -141,23 +141,8 @@ impl Session<'_> {
         if let Some(refinements) = refinements {
             accuracy.refined(refinements);
         }
-        // Where facets change what is not known, nothing is said of the tolerance.
-        let of_facets = accuracy.facets.as_ref().map_or(Some([0.0; 2]), |facets| facets.change);
-        if let Some(((tolerance, errors), of_facets)) =
-            self.config.accuracy.tolerance.zip(errors).zip(of_facets)
-        {
-            let unrefined = [of_facets, excess.unwrap_or_default()];
-            let kept = kept(tolerance, (errors, unrefined), objective, observer);
-            accuracy.within_tolerance = Some(kept == Kept::Yes);
-            let at_limit = matches!(stop_reason, StopReason::MaxEvaluations | StopReason::MaxTime);
-            let can_refine = |own: &Refinements| own.refinements.len() < self.config.accuracy.max_refinements;
-            if kept == Kept::ByNoBar && at_limit && refinements.is_some_and(can_refine) {
-                observer.notice(&format!(
-                    "{}: a run that is resumed with more looks at its mesh again",
-                    stop_reason.describe()
-                ));
-            }
-        }
+        accuracy.within_tolerance =
+            self.is_within_tolerance(&accuracy, (objective, stop_reason), known, observer);
         let corrected = errors.map(|errors| accuracy.estimated(of_run, errors));
         let analysis = &self.config.analysis;
         let is_checked = self.is_checked(stop_reason) && objective.ratio != 1.0;
@@ -180,6 +165,28 @@ impl Session<'_> {
         };
         self.judge(&mut accuracy, (objective, corrected), keeps_all, observer);
         (accuracy != Accuracy::default()).then_some(accuracy)
+    }
+
+    /// Whether a tolerance is kept; `None` without one, and where the errors or what facets change are not known.
+    fn is_within_tolerance(
+        &self,
+        accuracy: &Accuracy,
+        (objective, stop_reason): (&ObjectiveResult, StopReason),
+        &Known { errors, excess, refinements }: &Known<'_>,
+        observer: &mut dyn Observer,
+    ) -> Option<bool> {
+        let of_facets = accuracy.facets.as_ref().map_or(Some([0.0; 2]), |facets| facets.change)?;
+        let unrefined = [of_facets, excess.unwrap_or_default()];
+        let kept = kept(self.config.accuracy.tolerance?, (errors?, unrefined), objective, observer);
+        let at_limit = matches!(stop_reason, StopReason::MaxEvaluations | StopReason::MaxTime);
+        let can_refine = |own: &Refinements| own.refinements.len() < self.config.accuracy.max_refinements;
+        if kept == Kept::ByNoBar && at_limit && refinements.is_some_and(can_refine) {
+            observer.notice(&format!(
+                "{}: a run that is resumed with more looks at its mesh again",
+                stop_reason.describe()
+            ));
+        }
+        Some(kept == Kept::Yes)
     }
 
     /// What the facets of a run change at its initial and its best shape.

@@ -205,14 +205,7 @@ impl Session<'_> {
         if config.output.fields == FieldsKept::FirstLast {
             recorder.write(best.evaluation, &self.setup.problem, &best.analysis)?;
         }
-        let is_refined = Self::is_refined(refinements.as_ref());
-        let directory = &self.directory;
-        let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
-        exports::write(config, &self.directory, &optimum, &best.analysis.mesh, observer)?;
-        if is_refined {
-            // Of a mesh before, where the run had ended on it and was resumed.
-            directory.remove(&directory.optimum())?;
-        }
+        self.export_optimum(&best.analysis.mesh, Self::is_refined(refinements.as_ref()), observer)?;
         let solved = [first.mesh.clone(), best.analysis.mesh.clone()];
         let reason = optimised.stop_reason;
         let (initial, first) = self.initial_states(first, (best, reason), observer)?;
@@ -261,6 +254,23 @@ impl Session<'_> {
         drop(recorder);
         let known = Known { errors, excess, refinements: refinements.as_ref() };
         self.confirm(result, (&shapes, &meshes), &known, observer)
+    }
+
+    /// Writes the mesh of the best design; that of a refined one under a name of its own.
+    fn export_optimum(
+        &self,
+        mesh: &Mesh,
+        is_refined: bool,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), Error> {
+        let directory = &self.directory;
+        let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
+        exports::write(self.config, directory, &optimum, mesh, observer)?;
+        if is_refined {
+            // Of a mesh before, where the run had ended on it and was resumed.
+            directory.remove(&directory.optimum())?;
+        }
+        Ok(())
     }
 
     /// Enters the estimated errors at the initial and the best design, and writes where those of the best one are made.

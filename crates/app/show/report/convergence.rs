@@ -60,7 +60,7 @@ pub(super) fn figures(data: &RunData) -> Markup {
             Some(force.iter().map(|f| f * f).sum::<f64>().sqrt())
         };
         let under = body.state.as_ref().map_or(String::new(), |state| format!(", {state}"));
-        all.push(("force", series(&format!("force on {}{under} [N]", body.name), &size)));
+        all.push(("force", series(&format!("|force| on {}{under} [N]", body.name), &size)));
     }
     all.push((
         "gradient",

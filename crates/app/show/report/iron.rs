@@ -24,13 +24,10 @@ const MOST_CARDS: usize = 2;
 /// The figures that the head of the page shows: forces, and the highest flux density in iron.
 pub(super) fn cards(data: &RunData) -> Vec<Card> {
     let Some(result) = &data.result else { return Vec::new() };
-    let size = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
+    // Of a body that planes of symmetry cut, components cancel which its size would hide.
     let of_body = |body: &BodyForce| {
-        (
-            "force",
-            format!("{} N", number(size(body.force_n), 4)),
-            format!("on {}, of the meshed part", body.name),
-        )
+        let [x, y, z] = body.force_n.map(|component| number(component, 3));
+        ("force", format!("({x}, {y}, {z}) N"), format!("on {}, of the meshed part", body.name))
     };
     let mut cards: Vec<Card> = result.forces.iter().take(MOST_CARDS).map(of_body).collect();
     let regions = result.saturation.iter().flat_map(|saturation| &saturation.regions);

@@ -49,7 +49,11 @@ pub fn open_shell(mesh: &Mesh, parameters: &OpenShellParameters) -> Result<Mesh,
         || topology.surface_names().any(|name| name == parameters.outer);
     if is_taken {
         let taken = format!("`{}` and `{}`", parameters.region, parameters.outer);
-        return Err(refuse("open", &taken, "a mesh without these names: they are those of the shell"));
+        return Err(refuse(
+            "open",
+            &taken,
+            "a mesh without these names, which are those of the shell; one that has its shell already names it as the region of open space",
+        ));
     }
     let faces = covered_faces(mesh, parameters)?;
     let layers = Layers::new(mesh, &faces, parameters);
