@@ -31,3 +31,4 @@ pub use text::document::Document;
 pub use text::nearest::{nearest, nearest_two};
 pub use text::quantity::{QuantityError, parse_quantity};
 pub use text::source::SourceMap;
+pub(crate) use value::LONGEST_LENGTH;

@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{FileHash, json_place};
-use crate::config::{Diagnostic, DiagnosticReport, Document, Span, Subject};
+use crate::config::{Diagnostic, DiagnosticReport, Document, LONGEST_LENGTH, Span, Subject};
 
 /// Largest design file that is read [bytes]: a million variables with their points.
 const LARGEST: u64 = 256 * 1024 * 1024;
@@ -155,11 +155,12 @@ pub fn read_design(path: &Path, expected: usize) -> Result<DesignFile, DesignFil
         return Err(content("it has no list `design.values_m`".to_owned()));
     };
     let number = |(index, item): (usize, &Value)| {
-        item.as_f64().ok_or_else(|| {
+        item.as_f64().filter(|value| value.abs() <= LONGEST_LENGTH).ok_or_else(|| {
             let from = text.find("\"values_m\"").filter(|_| value.is_object()).unwrap_or(0);
             let span = json_place::item(text, from, index).unwrap_or(0..0);
             let shown: String = item.to_string().chars().take(60).collect();
-            faulty(span, format!("item {index} is {shown}, not a number"))
+            let what = if item.is_number() { "no length of a device" } else { "not a number" };
+            faulty(span, format!("item {index} is {shown}, {what}"))
         })
     };
     let values = list.iter().enumerate().map(number).collect::<Result<Vec<_>, _>>()?;
@@ -198,6 +199,7 @@ mod tests {
             ("{}", "no list `design.values_m`"),
             ("5", "no list"),
             ("[1e999, 0]", "number out of range"),
+            ("[0, 1e308]", "item 1 is 1e+308, no length of a device"),
             ("[1, ", "line 1"),
             (r#"{"design": {"values_m": [1, 2], "points_m": [[1, 2]]}}"#, "no list of points"),
         ];

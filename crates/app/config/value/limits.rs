@@ -4,4 +4,4 @@
 pub(in crate::config) const LONGEST_LIST: usize = 100_000;
 
 /// Longest length and farthest coordinate of a device [m]: far beyond any use, and its powers stay far from overflow.
-pub(in crate::config) const LONGEST_LENGTH: f64 = 1e6;
+pub(crate) const LONGEST_LENGTH: f64 = 1e6;

@@ -20,7 +20,7 @@ pub(super) use context::Context;
 pub(super) use entry::Entry;
 pub(super) use kind::{Kind, Value};
 pub(super) use known_keys::KnownKeys;
-pub(super) use limits::LONGEST_LENGTH;
+pub(crate) use limits::LONGEST_LENGTH;
 pub(super) use list::NotEmpty;
 pub(super) use number::{Number, PerAxis, Whole, ZeroOr};
 pub(super) use placeholder::Placeholder;
