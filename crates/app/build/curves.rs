@@ -1,11 +1,11 @@
 //! The B–H curves of a configuration, from its own lists and from files.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use fluxmorph_geometry::io::open_regular;
+use fluxmorph_geometry::io::read_at_most;
 use fluxmorph_solver::BhCurve;
 use fluxmorph_solver::bh::{Analytic, Knee};
 
@@ -143,14 +143,12 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
         Box::new(source.diagnostic(&key, message).expected(expected))
     };
     let whole = |message: String| refused(String::new(), message);
-    let mut bytes = Vec::new();
-    let read = open_regular(path).and_then(|file| file.take(LARGEST_FILE + 1).read_to_end(&mut bytes));
-    read.map_err(|error| whole(error.to_string()))?;
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(whole(format!(
-            "it has more than {LARGEST_FILE} bytes, and a curve takes some hundred points"
-        )));
-    }
+    let bytes = read_at_most(path, LARGEST_FILE).map_err(|error| match error.kind() {
+        ErrorKind::FileTooLarge => {
+            whole(format!("it has more than {LARGEST_FILE} bytes, and a curve takes some hundred points"))
+        }
+        _ => whole(error.to_string()),
+    })?;
     let text = String::from_utf8(bytes).map_err(|_| whole("it is no text in UTF-8".to_owned()))?;
     let hash = blake3_hex(text.as_bytes());
     let mut lines = Vec::new();

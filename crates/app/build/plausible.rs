@@ -166,8 +166,9 @@ pub(super) fn warnings(
             ));
         }
     }
+    let free = if open_patches.is_empty() { HashSet::new() } else { faces_without_condition(config, mesh) };
     warnings.extend(config.regions.iter().flat_map(|(name, own)| {
-        own.remanence.map(|remanence| magnet_warnings(config, mesh, (name, remanence))).unwrap_or_default()
+        own.remanence.map(|own| magnet_warnings(config, (mesh, &free), (name, own))).unwrap_or_default()
     }));
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
     warnings.extend(
@@ -175,7 +176,7 @@ pub(super) fn warnings(
     );
     warnings.extend(super::forces::warnings(config, mesh, coils));
     warnings.extend(phase_warnings(config));
-    warnings.extend(component_warnings(config, mesh));
+    warnings.extend(component_warnings(config, (mesh, &free)));
     warnings.extend(unit_hint(config, mesh));
     warnings
 }
@@ -304,7 +305,11 @@ fn image_warning(config: &Config, topology: &Topology, coil: &Coil) -> Option<St
 }
 
 /// What to say of a magnet that is cut by a surface which mirrors a part of its remanence reversed, or that no magnet has.
-fn magnet_warnings(config: &Config, mesh: &Mesh, (name, remanence): (&str, Point)) -> Vec<String> {
+fn magnet_warnings(
+    config: &Config,
+    (mesh, free): (&Mesh, &HashSet<[NodeId; 3]>),
+    (name, remanence): (&str, Point),
+) -> Vec<String> {
     let (topology, size) = (mesh.topology(), norm(remanence));
     let mut warnings = Vec::new();
     if size > MOST_REMANENCE {
@@ -313,7 +318,7 @@ fn magnet_warnings(config: &Config, mesh: &Mesh, (name, remanence): (&str, Point
         ));
     }
     let Ok(region) = topology.region(name) else { return warnings };
-    warnings.extend(turning_surfaces(config, mesh, region, remanence).map(|Turning { surface, kind, part }| {
+    warnings.extend(turning_surfaces(config, (mesh, free), region, remanence).map(|Turning { surface, kind, part }| {
         format!(
             "the magnet `{name}` is cut by {surface}, {kind}, which mirrors the part of its remanence {part} the surface reversed"
         )
@@ -331,11 +336,11 @@ struct Turning {
     part: &'static str,
 }
 
-/// The first surface of either condition, and of none, on which a region ends, and which mirrors a part of a vector there reversed, as
-/// it does of B.
+/// The first surface of either condition, and of the faces that are free of one, on which a region ends, and which mirrors a part of a
+/// vector there reversed, as it does of B.
 fn turning_surfaces(
     config: &Config,
-    mesh: &Mesh,
+    (mesh, free): (&Mesh, &HashSet<[NodeId; 3]>),
     region: RegionId,
     vector: Point,
 ) -> impl Iterator<Item = Turning> {
@@ -353,7 +358,7 @@ fn turning_surfaces(
             surfaces.iter().find(|surface| turns(&faces_of(topology, [surface.as_str()]), is_reversed));
         found.map(|surface| Turning { surface: format!("`{surface}`"), kind, part })
     };
-    let free = turns(&faces_without_condition(config, mesh), along).then(|| Turning {
+    let free = turns(free, along).then(|| Turning {
         surface: "an outer side without condition".to_owned(),
         kind: "at which the field is left normal as in flux_normal",
         part: "along",
@@ -375,13 +380,13 @@ pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
 }
 
 /// What to say of the homogeneity of a component that is another one in the images of its region: the mean is not the device's.
-fn component_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+fn component_warnings(config: &Config, (mesh, free): (&Mesh, &HashSet<[NodeId; 3]>)) -> Vec<String> {
     let of = |(path, own): (String, &Functional)| {
         let is_component = own.kind == ObjectiveKind::Homogeneity
             && own.compare.is_none_or(|compared| compared == Compared::Component);
         let (direction, name) = (own.direction.filter(|_| is_component)?, own.region.as_ref()?);
         let region = mesh.topology().region(name).ok()?;
-        let Turning { surface, .. } = turning_surfaces(config, mesh, region, direction).next()?;
+        let Turning { surface, .. } = turning_surfaces(config, (mesh, free), region, direction).next()?;
         Some(format!(
             "{path}: behind {surface} the images of `{name}` have another component along this direction, and what is computed is the \
              deviation of the meshed part from its own mean, which is not that of the whole device; take a direction that the plane \

@@ -64,17 +64,16 @@ enum Standing {
     Free,
     /// A plane of `flux_normal`.
     Normal,
-    /// A plane that coils, matter or what is observed reach: one of symmetry.
+    /// A side that coils or matter reach, or a plane that what is observed does: one of symmetry.
     Reached,
 }
 
 /// A side of the mesh.
 struct Side {
     patch: OpenPatch,
-    /// Its nodes, each at least once.
+    /// Its nodes, each at least once, and the box around them.
     nodes: Vec<NodeId>,
-    /// Whether coils or matter reach it.
-    has_matter: bool,
+    bounds: AxisBox,
     standing: Standing,
 }
 
@@ -85,9 +84,28 @@ impl Side {
         let is_opposite = |other: &&Self| {
             dot(patch.area_vector, other.patch.area_vector) < OPPOSITE * patch.area * other.patch.area
         };
-        let is_free = !matches!(standing, Standing::Wall | Standing::Reached);
-        let has_opposite = all.iter().filter(is_opposite).any(|other| other.standing >= *standing);
-        !self.has_matter && (*standing == Standing::Wall || is_free && has_opposite)
+        match standing {
+            Standing::Wall => true,
+            Standing::Free | Standing::Normal => {
+                all.iter().filter(is_opposite).any(|other| other.standing >= *standing)
+            }
+            Standing::Reached => false,
+        }
+    }
+
+    /// Square of its distance from the nearest of some places [m²].
+    fn square_distance<'a>(&self, mesh: &Mesh, places: impl Iterator<Item = &'a AxisBox>) -> f64 {
+        let mut by_bound: Vec<_> = places.map(|place| (place.square_gap(&self.bounds), place)).collect();
+        by_bound.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut nearest = f64::INFINITY;
+        for (bound, place) in by_bound {
+            if bound >= nearest {
+                break;
+            }
+            let to_nodes = self.nodes.iter().map(|&n| place.square_distance(mesh.point(n)));
+            nearest = to_nodes.fold(nearest, f64::min);
+        }
+        nearest
     }
 }
 
@@ -109,12 +127,8 @@ impl Truncation {
         let (sources, observed) = (AxisBox::around(&points), observed(config, mesh));
         let hull = Hull::new(mesh);
         let sides = sides(&hull, model, (&sources, &observed));
-        let distance = |side: &Side| {
-            let to = |from: &AxisBox| {
-                side.nodes.iter().map(|&n| from.square_distance(mesh.point(n))).fold(f64::INFINITY, f64::min)
-            };
-            observed.iter().map(to).fold(to(&sources), f64::min).sqrt()
-        };
+        let places = || observed.iter().chain([&sources]);
+        let distance = |side: &Side| side.square_distance(mesh, places()).sqrt();
         let walls = sides.iter().filter(|side| side.is_wall(&sides)).map(|side| (side, distance(side)));
         let (side, distance_m) = walls.min_by(|a, b| a.1.total_cmp(&b.1))?;
         let (source_size_m, near) = size(mesh, &sources, &observed);
@@ -155,22 +169,25 @@ fn sides(hull: &Hull<'_>, model: &FieldModel, (sources, observed): (&AxisBox, &[
     let normal = with(&|own| own == Boundary::FluxNormal);
     let others = with(&|own| own != Boundary::FluxNormal);
     let of = |patch: OpenPatch| {
+        let nodes: Vec<NodeId> = patch.faces.iter().flat_map(|&face| faces[face].nodes).collect();
+        let bounds = AxisBox::around(&nodes.iter().map(|&n| mesh.point(n)).collect::<Vec<_>>());
         let is_reached = |from: &AxisBox| {
             let of_face = |&face: &usize| AxisBox::around(&hull.corners(face)).grown(rounding).meets(from);
-            patch.faces.iter().any(of_face)
+            bounds.grown(rounding).meets(from) && patch.faces.iter().any(of_face)
         };
         let all = |of: &HashSet<_>| patch.faces.iter().all(|&face| of.contains(&face_key(faces[face].nodes)));
         let any = |of: &HashSet<_>| patch.faces.iter().any(|&face| of.contains(&face_key(faces[face].nodes)));
-        let has_matter = is_reached(sources);
-        let standing = match norm(patch.area_vector) >= PLANE * patch.area {
-            false => Standing::Wall,
-            true if has_matter || observed.iter().any(is_reached) => Standing::Reached,
-            true if all(&normal) => Standing::Normal,
-            true if any(&others) => Standing::Wall,
-            true => Standing::Free,
+        let is_plane = norm(patch.area_vector) >= PLANE * patch.area;
+        let standing = if is_reached(sources) || is_plane && observed.iter().any(is_reached) {
+            Standing::Reached
+        } else if !is_plane || any(&others) {
+            Standing::Wall
+        } else if all(&normal) {
+            Standing::Normal
+        } else {
+            Standing::Free
         };
-        let nodes = patch.faces.iter().flat_map(|&face| faces[face].nodes).collect();
-        Side { has_matter, standing, nodes, patch }
+        Side { standing, nodes, bounds, patch }
     };
     let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
     let replaced: HashSet<_> = replaced.map(|triangle| face_key(*triangle)).collect();

@@ -1,10 +1,10 @@
 //! Reads a configuration: a text with overrides laid over it, all tables, and the cases of a sweep.
 
 use std::collections::HashSet;
-use std::io::Read;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use fluxmorph_geometry::io::open_regular;
+use fluxmorph_geometry::io::read_at_most;
 
 use super::error::{ConfigError, DiagnosticReport};
 use super::schema::keys::known_keys;
@@ -109,14 +109,10 @@ fn read_text(path: &Path) -> Result<String, ConfigError> {
         let extension = extension.to_string_lossy().into_owned();
         return Err(ConfigError::GmshFile { path: path.to_owned(), extension });
     }
-    let unreadable = |source| ConfigError::Read { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    // One byte more than allowed tells a file that is too large, without trusting the size it reports.
-    let file = open_regular(path).map_err(unreadable)?;
-    file.take(LARGEST_FILE + 1).read_to_end(&mut bytes).map_err(unreadable)?;
-    if bytes.len() as u64 > LARGEST_FILE {
-        return Err(ConfigError::TooLarge { path: path.to_owned(), limit: LARGEST_FILE });
-    }
+    let bytes = read_at_most(path, LARGEST_FILE).map_err(|source| match source.kind() {
+        ErrorKind::FileTooLarge => ConfigError::TooLarge { path: path.to_owned(), limit: LARGEST_FILE },
+        _ => ConfigError::Read { path: path.to_owned(), source },
+    })?;
     String::from_utf8(bytes).map_err(|error| ConfigError::NotText {
         path: path.to_owned(),
         offset: error.utf8_error().valid_up_to(),

@@ -139,12 +139,6 @@ impl Accuracy {
         self.verdict == Some(Verdict::Confirmed) && bar.is_some_and(|bar| bar >= (ratio - 1.0).abs())
     }
 
-    /// The verdict in words, of a gain that is smaller than its error bar with that; `None` without one.
-    pub fn describe_gain(&self, ratio: f64) -> Option<String> {
-        let small = if self.hides_gain(ratio) { ", but smaller than its error bar" } else { "" };
-        Some(format!("{}{small}", self.verdict?.describe()))
-    }
-
     /// Whether there is something that no estimate of the field counts.
     pub fn says_something_of_the_geometry(&self) -> bool {
         self.facets.is_some() || self.near_wall.is_some() || self.excess.is_some()

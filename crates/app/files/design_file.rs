@@ -1,10 +1,10 @@
 //! Reads a design: a `result.json`, or a JSON array of lengths in metres.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use fluxmorph_geometry::io::open_regular;
+use fluxmorph_geometry::io::read_at_most;
 use fluxmorph_geometry::millimetres;
 use fluxmorph_optimizer::design::DesignSurface;
 use serde::Deserialize;
@@ -129,12 +129,10 @@ impl DesignFile {
 /// When the file cannot be read, is no design, or has another number of values.
 pub fn read_design(path: &Path, expected: usize) -> Result<DesignFile, DesignFileError> {
     let content = |message: String| DesignFileError::Content { path: path.to_owned(), message };
-    let unreadable = |source| DesignFileError::Read { path: path.to_owned(), source };
-    let mut bytes = Vec::new();
-    open_regular(path).and_then(|file| file.take(LARGEST + 1).read_to_end(&mut bytes)).map_err(unreadable)?;
-    if bytes.len() as u64 > LARGEST {
-        return Err(content(format!("it has more than {LARGEST} bytes")));
-    }
+    let bytes = read_at_most(path, LARGEST).map_err(|source| match source.kind() {
+        ErrorKind::FileTooLarge => content(format!("it has more than {LARGEST} bytes")),
+        _ => DesignFileError::Read { path: path.to_owned(), source },
+    })?;
     let text = std::str::from_utf8(&bytes)
         .map_err(|error| content(format!("it is not UTF-8 text at byte {}", error.valid_up_to())))?;
     let faulty = |range: std::ops::Range<usize>, message: String| {

@@ -5,11 +5,11 @@
 
 use std::fmt::Debug;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Read, Write};
+use std::io::{self, Write};
 use std::path::Path;
 use std::sync::Arc;
 
-use fluxmorph_geometry::io::open_regular;
+use fluxmorph_geometry::io::read_at_most;
 
 /// Operations on files and folders. All but [`Disk::read`] and [`Disk::names`] change something, and all fail where the
 /// operating system refuses; what else they fail with stands with them.
@@ -158,9 +158,7 @@ impl Disk for SystemDisk {
         if plain(&fs::metadata(path)?)? > most {
             return Err(io::ErrorKind::FileTooLarge.into());
         }
-        let mut bytes = Vec::new();
-        open_regular(path)?.take(most.saturating_add(1)).read_to_end(&mut bytes)?;
-        if bytes.len() as u64 > most { Err(io::ErrorKind::FileTooLarge.into()) } else { Ok(bytes) }
+        read_at_most(path, most)
     }
 
     fn names(&self, path: &Path) -> io::Result<Vec<String>> {

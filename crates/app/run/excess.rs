@@ -3,7 +3,7 @@
 //! Every mesh and all elements leave it out alike: it is in no estimate of the error and in no check, and a shape may have its gain
 //! from it.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use fluxmorph_geometry::Readable;
 use fluxmorph_optimizer::constraint::{Bound, Quantity};
@@ -57,7 +57,7 @@ pub(super) struct LeftOut(Vec<OfState>);
 /// What they leave out of one state.
 struct OfState {
     /// Of losses, by region [W].
-    losses: HashMap<String, f64>,
+    losses: BTreeMap<String, f64>,
     /// The current of the one coil, where all losses are its [A].
     current: Option<f64>,
 }
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn what_is_left_out_is_of_losses_and_of_what_one_coil_sees_of_them() {
-        let losses = HashMap::from([("plate".to_owned(), 3.0), ("wall".to_owned(), 1.0)]);
+        let losses = BTreeMap::from([("plate".to_owned(), 3.0), ("wall".to_owned(), 1.0)]);
         let mut state = OfState { losses, current: Some(4.0) };
         let plate = "plate".to_owned();
         assert_eq!(state.more("loss", Some(&plate)), Some(3.0));

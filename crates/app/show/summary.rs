@@ -211,8 +211,13 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ));
     }
     rows.extend(accuracy.verdict.map(|verdict| {
-        let is_good = verdict == Verdict::Confirmed && !accuracy.hides_gain(*ratio);
-        let style = if is_good { styles.good } else { styles.bad };
+        let (style, small) = match verdict {
+            Verdict::Confirmed if accuracy.hides_gain(*ratio) => {
+                (styles.bad, ", but smaller than its error bar")
+            }
+            Verdict::Confirmed => (styles.good, ""),
+            Verdict::NotConfirmed => (styles.bad, ""),
+        };
         let opinions = [
             objective.verification.is_some(),
             accuracy.cross_check.as_ref().is_some_and(|check| !check.by_estimate),
@@ -220,7 +225,7 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         ];
         let alone = opinions.iter().filter(|is_there| **is_there).count() == 1;
         let remark = if alone { " (by one check alone)" } else { "" };
-        let text = accuracy.describe_gain(*ratio).unwrap_or_default();
+        let text = format!("{}{small}", verdict.describe());
         ("gain", format!("{}{remark}", styled(style, &text)))
     }));
     rows

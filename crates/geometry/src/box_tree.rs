@@ -74,6 +74,12 @@ impl AxisBox {
         x * x + y * y + z * z
     }
 
+    /// Square of the distance between two boxes [m²], zero where they meet.
+    pub fn square_gap(&self, other: &Self) -> f64 {
+        let beside = |d: usize| (self.lower[d] - other.upper[d]).max(other.lower[d] - self.upper[d]).max(0.0);
+        (0..3).map(|d| beside(d) * beside(d)).sum()
+    }
+
     /// The smallest box around both.
     pub fn with(self, other: &Self) -> Self {
         Self {

@@ -10,7 +10,7 @@ pub mod vtu;
 
 pub use msh::{MshEncoding, MshError, MshMesh, MshNotices, msh_bytes, read_msh, read_msh_file};
 pub use pvd::pvd_text;
-pub use regular::open_regular;
+pub use regular::{open_regular, read_at_most};
 pub use stl::stl_bytes;
 pub use vtu::{
     ArrayData, Field, VtuArray, VtuContents, VtuPiece, join_pieces, pvtu_pieces, pvtu_text, read_vtu,

@@ -104,6 +104,9 @@ struct SurfaceTriangle {
 
 /// What the impedance surfaces of a field leave out of the losses of their conductors.
 pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<ExcessLoss> {
+    if model.conductors().iter().all(|own| !matches!(own.law, SurfaceLaw::Impedance(_))) {
+        return Vec::new();
+    }
     let of_surfaces = solution.surface_losses(model, mesh).into_iter();
     let losses: HashMap<[NodeId; 3], f64> = of_surfaces.map(|(_, t, loss)| (face_key(t), loss)).collect();
     let outer = || mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
