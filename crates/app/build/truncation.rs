@@ -124,14 +124,16 @@ impl Truncation {
         if points.is_empty() {
             return None;
         }
-        let (sources, observed) = (AxisBox::around(&points), observed(config, mesh));
+        let [lower, upper] = mesh.bounding_box();
+        let whole = AxisBox { lower, upper };
+        let (sources, observed) = (AxisBox::around(&points), observed(config, mesh, &whole));
         let hull = Hull::new(mesh);
-        let sides = sides(&hull, model, (&sources, &observed));
+        let sides = sides(&hull, model, (&sources, &observed), rounding(&whole));
         let places = || observed.iter().chain([&sources]);
         let distance = |side: &Side| side.square_distance(mesh, places()).sqrt();
         let walls = sides.iter().filter(|side| side.is_wall(&sides)).map(|side| (side, distance(side)));
         let (side, distance_m) = walls.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let (source_size_m, near) = size(mesh, &sources, &observed);
+        let (source_size_m, near) = size(&whole, &sources, &observed);
         let (surface, at_m) = name(&hull, side);
         Some(Self { surface, at_m, distance_m, source_size_m, near })
     }
@@ -157,10 +159,14 @@ impl Truncation {
     }
 }
 
-/// The sides of a mesh, and which of them coils and matter reach, or what is observed.
-fn sides(hull: &Hull<'_>, model: &FieldModel, (sources, observed): (&AxisBox, &[AxisBox])) -> Vec<Side> {
+/// The sides of a mesh, and which of them coils and matter reach, or what is observed, to the rounding of coordinates [m].
+fn sides(
+    hull: &Hull<'_>,
+    model: &FieldModel,
+    (sources, observed): (&AxisBox, &[AxisBox]),
+    rounding: f64,
+) -> Vec<Side> {
     let (mesh, faces) = (hull.mesh(), hull.faces());
-    let rounding = ROUNDING * diagonal(mesh);
     let boundaries = &model.setup().boundaries;
     let with = |is: &dyn Fn(Boundary) -> bool| {
         let names = boundaries.iter().filter(|own| is(own.1)).map(|own| own.0.as_str());
@@ -211,35 +217,34 @@ fn name(hull: &Hull<'_>, side: &Side) -> (String, Option<Point>) {
     }
 }
 
-/// Length from corner to corner of a mesh [m].
-fn diagonal(mesh: &Mesh) -> f64 {
-    let [lower, upper] = mesh.bounding_box();
-    norm(sub(upper, lower))
+/// How far off coordinates in a box around a mesh may be [m].
+fn rounding(whole: &AxisBox) -> f64 {
+    ROUNDING * norm(sub(whole.upper, whole.lower))
 }
 
-/// In which directions a box reaches the least and the greatest coordinates of a mesh.
-fn cuts(mesh: &Mesh, own: &AxisBox) -> [[bool; 2]; 3] {
-    let ([lower, upper], rounding) = (mesh.bounding_box(), ROUNDING * diagonal(mesh));
-    [0, 1, 2].map(|d| [own.lower[d] <= lower[d] + rounding, own.upper[d] >= upper[d] - rounding])
+/// In which directions a box reaches the least and the greatest coordinates of that around the mesh.
+fn cuts(whole: &AxisBox, own: &AxisBox) -> [[bool; 2]; 3] {
+    let rounding = rounding(whole);
+    [0, 1, 2].map(|d| [own.lower[d] <= whole.lower[d] + rounding, own.upper[d] >= whole.upper[d] - rounding])
 }
 
 /// Half the diagonal of the box around all that makes, bends and observes the field, with what planes of symmetry cut off [m], and in
-/// how many of it a wall is near.
-fn size(mesh: &Mesh, sources: &AxisBox, observed: &[AxisBox]) -> (f64, f64) {
+/// how many of it a wall is near; `mesh` is the box around that.
+fn size(mesh: &AxisBox, sources: &AxisBox, observed: &[AxisBox]) -> (f64, f64) {
     let all = observed.iter().fold(*sources, |all, own| all.with(own));
     // What a plane of symmetry cuts goes on behind it.
     let of_all = cuts(mesh, &all);
-    let whole = |d: usize| {
+    let extent = |d: usize| {
         let own = all.upper[d] - all.lower[d];
         if of_all[d][0] != of_all[d][1] { 2.0 * own } else { own }
     };
     let is_plane = cuts(mesh, sources).contains(&[true, true]);
-    (0.5 * norm([0, 1, 2].map(whole)), if is_plane { NEAR_IN_A_PLANE } else { NEAR })
+    (0.5 * norm([0, 1, 2].map(extent)), if is_plane { NEAR_IN_A_PLANE } else { NEAR })
 }
 
 /// The places at which B is observed: the boxes around regions and expansions, as far as they lie in the mesh, and the points of
-/// probes. A region that fills the mesh is no place.
-fn observed(config: &Config, mesh: &Mesh) -> Vec<AxisBox> {
+/// probes. A region that fills the mesh, of which `whole` is the box, is no place.
+fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<AxisBox> {
     let topology = mesh.topology();
     let is_of_places = |kind: ObjectiveKind| {
         use ObjectiveKind::{FieldComponent, FluxDensitySquared, Homogeneity, TargetField};
@@ -252,12 +257,12 @@ fn observed(config: &Config, mesh: &Mesh) -> Vec<AxisBox> {
     };
     let of_regions = regions.map(|region| AxisBox::around(&corners(region)));
     let of_probes = config.probes.iter().flat_map(|probe| &probe.points).map(|&p| AxisBox::around(&[p]));
-    let [lower, upper] = mesh.bounding_box();
+    let AxisBox { lower, upper } = whole;
     let of_expansions = config.multipoles.iter().map(|set| AxisBox {
         lower: std::array::from_fn(|d| (set.center[d] - set.radius).clamp(lower[d], upper[d])),
         upper: std::array::from_fn(|d| (set.center[d] + set.radius).clamp(lower[d], upper[d])),
     });
-    let is_place = |own: &AxisBox| cuts(mesh, own) != [[true; 2]; 3];
+    let is_place = |own: &AxisBox| cuts(whole, own) != [[true; 2]; 3];
     of_regions.chain(of_probes).chain(of_expansions).filter(is_place).collect()
 }
 
