@@ -42,6 +42,9 @@ pub struct StateErrors {
     /// Of the currents that voltages drive [A].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub currents_a: BTreeMap<String, f64>,
+    /// Of the resistances of solid conductors at 0 Hz [Ω].
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub resistances_ohm: BTreeMap<String, f64>,
     /// Of the flux linkages of coils with `turns` [Wb].
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub flux_linkages_wb: BTreeMap<String, f64>,
@@ -62,7 +65,10 @@ impl StateErrors {
         let forces = self.forces.values().flat_map(|own| [own.force_n, own.torque_nm]);
         let terms = self.multipoles_t.values().flat_map(|terms| terms.values().copied());
         let probes = self.probes_t.values().flatten().flatten().copied();
-        let coils = self.currents_a.values().chain(self.flux_linkages_wb.values());
+        let coils = [&self.currents_a, &self.resistances_ohm, &self.flux_linkages_wb]
+            .map(BTreeMap::values)
+            .into_iter()
+            .flatten();
         let others = self.losses_w.values().chain(coils).copied();
         others.chain(forces).chain(terms).chain(probes).all(f64::is_finite)
     }

@@ -9,7 +9,7 @@ use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_optimizer::body::{Body, BodyForce};
 use fluxmorph_optimizer::problem::Problem;
-use fluxmorph_solver::circuit::{currents, flux_linkages};
+use fluxmorph_solver::circuit::{currents, direct_resistances, flux_linkages};
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
 
@@ -17,6 +17,9 @@ use crate::build::multipole;
 use crate::config::{Config, MultipoleSet, Probe};
 use crate::error::Error;
 use crate::files::{ForceError, StateErrors};
+
+/// Differences that are rounding, as a share of the value.
+const ROUNDING: f64 = 1e-9;
 
 /// Whether the states of a problem report anything beside the objective.
 pub(super) fn is_something(config: &Config, problem: &Problem) -> bool {
@@ -41,6 +44,7 @@ pub(super) fn under(model: &FieldModel) -> String {
 pub(super) struct Reported {
     losses: Vec<(String, f64)>,
     currents: Vec<(String, c64)>,
+    resistances: Vec<(String, f64)>,
     flux_linkages: Vec<(String, c64)>,
     forces: Vec<BodyForce>,
     expansions: Vec<(String, Terms)>,
@@ -96,6 +100,7 @@ impl Reported {
         Some(Self {
             losses: solution.losses(model, mesh),
             currents: currents(model, solution),
+            resistances: direct_resistances(model),
             flux_linkages: flux_linkages(model, mesh, solution),
             forces: bodies.iter().map(|body| body.force(model, mesh, solution)).collect(),
             expansions,
@@ -108,7 +113,7 @@ impl Reported {
         let length = |a: &[c64], b: &[c64]| {
             times * a.iter().zip(b).map(|(a, b)| (b - a).norm_sqr()).sum::<f64>().sqrt()
         };
-        let loss =
+        let number =
             |((name, own), (_, more)): (&(String, f64), &(String, f64))| (name.clone(), times * (more - own));
         let amplitude = |((name, own), (_, more)): (&(String, c64), &(String, c64))| {
             (name.clone(), length(&[*own], &[*more]))
@@ -132,14 +137,21 @@ impl Reported {
         };
         let errors = StateErrors {
             multipoles_t: self.expansions.iter().zip(&better.expansions).map(expansion).collect(),
-            losses_w: self.losses.iter().zip(&better.losses).map(loss).collect(),
-            // A current that is given has none.
+            losses_w: self.losses.iter().zip(&better.losses).map(number).collect(),
+            // A current that is given has none, nor has the resistance of a straight bar.
             currents_a: self
                 .currents
                 .iter()
                 .zip(&better.currents)
+                .filter(|((_, own), (_, more))| (more - own).norm() > ROUNDING * own.norm())
                 .map(amplitude)
-                .filter(|own| own.1 > 0.0)
+                .collect(),
+            resistances_ohm: self
+                .resistances
+                .iter()
+                .zip(&better.resistances)
+                .filter(|((_, own), (_, more))| (more - own).abs() > ROUNDING * own)
+                .map(number)
                 .collect(),
             flux_linkages_wb: self.flux_linkages.iter().zip(&better.flux_linkages).map(amplitude).collect(),
             forces: self.forces.iter().zip(&better.forces).map(force).collect(),

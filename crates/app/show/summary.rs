@@ -268,13 +268,14 @@ fn coil_text(coil: &CoilResult, errors: Option<&StateErrors>) -> String {
         Amplitude::Phasor([re, im]) => format!("({re:.6e} {im:+.6e}j)"),
     };
     format!(
-        "{}: {} A{}, {} Wb{}, {:.6e} ohm, {} V",
+        "{}: {} A{}, {} Wb{}, {:.6e} ohm{}, {} V",
         printable(&coil.name),
         text(coil.current_a),
         bar(errors.and_then(|errors| errors.currents_a.get(&coil.name)), "A"),
         text(coil.flux_linkage_wb),
         bar(errors.and_then(|errors| errors.flux_linkages_wb.get(&coil.name)), "Wb"),
         coil.resistance_ohm,
+        bar(errors.and_then(|errors| errors.resistances_ohm.get(&coil.name)), "ohm"),
         text(coil.voltage_v)
     )
 }

@@ -29,14 +29,15 @@ pub(super) fn circuits(result: &RunResult) -> Markup {
 /// What the terminals of coils see.
 fn terminals(coils: &[CoilResult], errors: Option<&StateErrors>, load: Option<&str>) -> Markup {
     let row = |coil: &CoilResult| {
-        let driven = errors.and_then(|errors| errors.currents_a.get(&coil.name));
-        let of_current = driven.map_or(String::new(), |error| format!(" {}", bar(Some(error), 1.0)));
+        let behind = |error: Option<&f64>| error.map_or(String::new(), |_| format!(" {}", bar(error, 1.0)));
+        let of_current = behind(errors.and_then(|errors| errors.currents_a.get(&coil.name)));
+        let of_resistance = behind(errors.and_then(|errors| errors.resistances_ohm.get(&coil.name)));
         vec![
             coil.name.clone(),
             format!("{}{of_current}", amplitude(coil.current_a, "A")),
             amplitude(coil.flux_linkage_wb, "Wb"),
             bar(errors.and_then(|errors| errors.flux_linkages_wb.get(&coil.name)), 1.0),
-            format!("{} Ω", number(coil.resistance_ohm, 5)),
+            format!("{} Ω{of_resistance}", number(coil.resistance_ohm, 5)),
             amplitude(coil.voltage_v, "V"),
         ]
     };

@@ -24,6 +24,7 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 
 use crate::coil::{Coil, CoilShape};
+use crate::elements::Order;
 use crate::error::SolverError;
 use crate::load::Sources;
 use crate::material::Material;
@@ -31,7 +32,7 @@ use crate::space::Space;
 use crate::unknowns::Unknowns;
 pub(crate) use border::{Border, Excitation};
 pub(crate) use solids::{SolidRows, Solids};
-pub use terminals::{CoilTerminals, Terminals, currents, flux_linkages, terminals};
+pub use terminals::{CoilTerminals, Terminals, currents, direct_resistances, flux_linkages, terminals};
 
 /// A coil's winding, and the circuit that it is in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -189,11 +190,12 @@ impl Windings {
 /// The windings of all coils: that of a solid conductor has one turn, and at 0 Hz the resistance of its conduction.
 ///
 /// # Errors
-/// [`SolverError::EmptyRegion`] for a solid conductor of a material that does not conduct, or of several.
+/// [`SolverError::EmptyRegion`] for a solid conductor of a material that does not conduct, or of several; else as
+/// [`SolidConductor::direct_resistance`](crate::coil::SolidConductor::direct_resistance).
 pub(crate) fn windings(
     mesh: &Mesh,
-    coils: &[Coil],
-    windings: &[Option<Winding>],
+    order: Order,
+    (coils, windings): (&[Coil], &[Option<Winding>]),
     materials: &[Material],
     angular_frequency: f64,
 ) -> Result<Vec<Option<Winding>>, SolverError> {
@@ -212,7 +214,7 @@ pub(crate) fn windings(
         let winding = windings[coil].get_or_insert(Winding::SOLID);
         winding.turns = 1.0;
         if angular_frequency == 0.0 {
-            winding.resistance += conductor.direct_resistance(conductivity);
+            winding.resistance += conductor.direct_resistance(mesh, order, conductivity)?;
         }
     }
     Ok(windings)

@@ -4,6 +4,7 @@ use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 
 use super::{Driven, Windings, product};
+use crate::coil::CoilShape;
 use crate::error::SolverError;
 use crate::linear::PreparedSystem;
 use crate::model::FieldModel;
@@ -99,6 +100,17 @@ pub fn currents(model: &FieldModel, solution: &FieldSolution) -> Vec<(String, c6
         (model.coils()[driven.coil].name.clone(), windings.current(k, model, solution))
     };
     windings.coils.iter().enumerate().map(of).collect()
+}
+
+/// Resistances [Ω] of the solid conductors in statics with what is in series, by their names: they are known without the field. None
+/// above 0 Hz.
+pub fn direct_resistances(model: &FieldModel) -> Vec<(String, f64)> {
+    let is_direct = |driven: &&Driven| {
+        let shape = &model.coils()[driven.coil].shape;
+        model.angular_frequency() == 0.0 && matches!(shape, CoilShape::Solid(_))
+    };
+    let of = |driven: &Driven| (model.coils()[driven.coil].name.clone(), driven.winding.resistance);
+    model.windings().coils.iter().filter(is_direct).map(of).collect()
 }
 
 /// What the terminals see of a state; solves for 1 A in each coil with the state's matrix.

@@ -3,12 +3,13 @@
 //! Writing `J = curl T` and `T` on the right makes the discrete current exactly free of divergence, whether or not the
 //! mesh follows the coil. Lives here: the coil's place ([`frame`]), its shape and `T` ([`racetrack`]), the integral of
 //! `T` over a tetrahedron that the coil's edges cut ([`moment`], [`cut`]), the current of a coil that is a region of the
-//! mesh ([`region`], on the helpers `patch` and `potential`, and [`divergence`]), what drives a solid conductor ([`solid`]), all of it summed over coils
+//! mesh ([`region`], on the helpers `patch` and `potential`, and [`divergence`]), what drives a solid conductor ([`solid`], its resistance to second order `conduction`), all of it summed over coils
 //! ([`terms`]), where a coil may meet the outside of the mesh ([`planes`]), and whether the current of a region goes on there
 //! (`continuity`). `T` and `J` are fixed in space: elements
 //! that a winding meets must not move. In its window `T` is constant, and the mesh may move there as long as the patch that moves
 //! keeps its outline: `∫T·curl w` is `∮(T × w)·n` on that. A solid conductor may move above 0 Hz.
 
+mod conduction;
 pub(crate) mod continuity;
 pub mod cut;
 pub mod divergence;

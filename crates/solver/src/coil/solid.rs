@@ -3,21 +3,24 @@
 //! Its field is `E = −jω(A + ∇ψ) − V∇χ` with the voltage `V` and any fixed `χ` that is 1 on the terminal where current comes in
 //! and 0 on the other; round a ring `χ` falls by 1 a turn. Here it is that of conduction at 0 Hz on the reference mesh,
 //! `∫∇χ·∇q = 0`, so that what `ψ` is left with is small. On the mesh that moves it keeps its values at the nodes. Current at
-//! 0 Hz: `J = −∇χ/g` for 1 A, with the resistance `1/(σg)`, `g = ∫|∇χ|²` [m].
+//! 0 Hz: `J = −∇χ/g` for 1 A, with the resistance `1/(σg)`, `g = ∫|∇χ|²` [m]. Where the field is of second order, the resistance is so too.
 //!
 //! Separate parts between the same terminals are in series, each with its own `V`, or in parallel with one. What the circuit makes of
 //! `V` is in [`crate::circuit`].
 
 use std::f64::consts::TAU;
+use std::sync::{Arc, OnceLock};
 
 use fluxmorph_geometry::tet4::{Point, Tet4, dot};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
+use super::conduction;
 use super::divergence::Section;
 use super::fault::RegionFault;
 use super::patch::Patch;
 use super::potential::Potential;
 use super::region::{self, NO_RING, Path, RegionCurrent};
+use crate::elements::Order;
 use crate::error::SolverError;
 
 /// How separate parts between the same terminals are connected.
@@ -39,6 +42,8 @@ pub struct SolidConductor {
     direct: RegionCurrent,
     /// `g` of every segment.
     conductances: Vec<f64>,
+    /// The same to second order, once it was asked for.
+    of_second_order: Arc<OnceLock<Vec<f64>>>,
 }
 
 impl SolidConductor {
@@ -115,7 +120,7 @@ impl SolidConductor {
         let current = gradient.into_iter().zip(&segments).map(scaled).collect();
         let direct = RegionCurrent::of_conduction((patch, problem), current, terminals, sections);
         let potential = patch.elements.iter().copied().zip(chi).collect();
-        Self { potential, segments, direct, conductances }
+        Self { potential, segments, direct, conductances, of_second_order: Arc::default() }
     }
 
     /// The number of every element's segment, in the order of [`SolidConductor::potential`]: segments are in series, each with a
@@ -140,9 +145,32 @@ impl SolidConductor {
         &self.direct
     }
 
-    /// Resistance at 0 Hz [Ω] on the reference mesh, for a conductivity [S/m].
-    pub fn direct_resistance(&self, conductivity: f64) -> f64 {
-        self.conductances.iter().map(|g| 1.0 / (conductivity * g)).sum()
+    /// Resistance at 0 Hz [Ω] on the reference mesh, for a conductivity [S/m] and a potential of this order.
+    ///
+    /// # Errors
+    /// [`SolverError::Mesh`] where the solve of second order fails.
+    pub fn direct_resistance(
+        &self,
+        mesh: &Mesh,
+        order: Order,
+        conductivity: f64,
+    ) -> Result<f64, SolverError> {
+        let conductances = match order {
+            Order::Linear => &self.conductances,
+            Order::Quadratic => self.second_order(mesh)?,
+        };
+        Ok(conductances.iter().map(|g| 1.0 / (conductivity * g)).sum())
+    }
+
+    /// `g` of every segment to second order.
+    fn second_order(&self, mesh: &Mesh) -> Result<&Vec<f64>, SolverError> {
+        if let Some(known) = self.of_second_order.get() {
+            return Ok(known);
+        }
+        let taken = conduction::decrease(mesh, &self.potential, &self.segments, self.direct.terminals())?;
+        let of = |(g, taken): (&f64, f64)| g - taken;
+        let conductances = self.conductances.iter().zip(taken).map(of).collect();
+        Ok(self.of_second_order.get_or_init(|| conductances))
     }
 }
 

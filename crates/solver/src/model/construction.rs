@@ -5,7 +5,7 @@ use std::sync::Arc;
 use fluxmorph_geometry::Mesh;
 
 use super::{FieldModel, SharedParts};
-use crate::circuit::{self, Solids, Windings, solids};
+use crate::circuit::{self, Solids, Winding, Windings, solids};
 use crate::coil::continuity;
 use crate::discretisation::Discretisation;
 use crate::distributed::{Distributed, Follower};
@@ -45,8 +45,7 @@ impl FieldModel {
             }
             Some(_) => None,
         };
-        let of_coils =
-            circuit::windings(mesh, &setup.coils, &setup.windings, &setup.materials, angular_frequency)?;
+        let of_coils = Self::windings_of(mesh, &setup, angular_frequency)?;
         let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
         let sources = Sources::new(mesh, &given, &setup.magnetisation())?;
         let solids = Solids::new(&setup.coils, &fine.space, angular_frequency);
@@ -70,6 +69,16 @@ impl FieldModel {
         let model =
             Self { setup, angular_frequency, weak_form, shared, sources, windings, distributed: None };
         Ok(model.distributed_over_ranks(mesh))
+    }
+
+    /// The windings of all coils of a setup.
+    fn windings_of(
+        mesh: &Mesh,
+        setup: &FieldModelSetup,
+        angular_frequency: f64,
+    ) -> Result<Vec<Option<Winding>>, SolverError> {
+        let coils = (&*setup.coils, &*setup.windings);
+        circuit::windings(mesh, setup.order, coils, &setup.materials, angular_frequency)
     }
 
     /// The same, distributed where it has ranks and is not yet.
@@ -99,12 +108,9 @@ impl FieldModel {
             let (angular_frequency, weak_form) = Self::form_of(mesh, &setup)?;
             (angular_frequency, Arc::new(weak_form))
         };
-        let of_coils = |setup: &FieldModelSetup, angular_frequency: f64| {
-            circuit::windings(mesh, &setup.coils, &setup.windings, &setup.materials, angular_frequency)
-        };
-        let own = of_coils(&self.setup, self.angular_frequency)?;
+        let own = Self::windings_of(mesh, &self.setup, self.angular_frequency)?;
         let own = circuit::given_currents(&self.setup.coils, &own, self.angular_frequency);
-        let of_coils = of_coils(&setup, angular_frequency)?;
+        let of_coils = Self::windings_of(mesh, &setup, angular_frequency)?;
         let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
         let sources = if given == own {
             Arc::clone(&self.sources)
