@@ -209,6 +209,20 @@ fn a_search_goes_on_while_the_gradient_promises_many_times_the_tolerance() {
     assert!((mma - ccsaq).abs() < 4e-4, "{mma} {ccsaq}");
 }
 
+/// A deviation that can nearly vanish: methods that begin anew gain little at first, and ended at 1.7e-4 and 1.4e-4 where the gradient
+/// promised a hundred times their tolerance and more.
+#[test]
+fn a_search_that_begins_anew_is_not_believed_where_the_gradient_promises_much() {
+    let coarse = ("\"15 mm\", \"15 mm\", \"10 mm\"", "\"20 mm\", \"20 mm\", \"20 mm\"");
+    for algorithm in [Algorithm::Lbfgs, Algorithm::Slsqp] {
+        let search = |s| Optimizer { algorithm, max_evaluations: 80, ftol_rel: 1e-2, ..s };
+        let (run, _) = with("pole.toml", &[coarse, ("order = 2", "order = 1")], search);
+        let ratio = run.best.objective / run.initial;
+        println!("{algorithm:?}: F/F0 {ratio:.3e}, {:?}", run.stop_reason);
+        assert!(ratio < 1.2e-4 && run.stop_reason == StopReason::MaxEvaluations, "{algorithm:?}: {ratio:e}");
+    }
+}
+
 #[test]
 fn a_thickness_keeps_within_both_of_its_bounds() {
     let bounds =

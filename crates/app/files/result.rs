@@ -61,6 +61,9 @@ pub struct RunResult {
     /// Estimated errors of losses, forces, probes and flux linkages; `None` where there is no estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<StateErrors>,
+    /// What the facets of curved surfaces change of the same, about, of an analysis; `None` where none is curved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub facets_change: Option<StateErrors>,
     /// Newton's method and saturation, where there is a B–H curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub saturation: Option<SaturationResult>,
@@ -102,6 +105,12 @@ impl RunResult {
     pub fn enter_errors(&mut self, of_states: &[Option<StateErrors>]) {
         self.errors = of_states.first().cloned().flatten();
         self.states.iter_mut().zip(of_states).for_each(|(state, errors)| state.errors.clone_from(errors));
+    }
+
+    /// Enters what the facets of curved surfaces change of what its states report, in their order.
+    pub fn enter_facets(&mut self, of_states: &[Option<StateErrors>]) {
+        self.facets_change = of_states.first().cloned().flatten();
+        self.states.iter_mut().zip(of_states).for_each(|(state, own)| state.facets_change.clone_from(own));
     }
 
     /// Names of the constraints that the best design violates.
@@ -394,6 +403,7 @@ pub(crate) mod tests {
                 iterations: 4,
             },
             timings_s: [("total".to_owned(), 12.0)].into(),
+            facets_change: None,
             warnings: Vec::new(),
             peak_memory_bytes: 1 << 20,
         }

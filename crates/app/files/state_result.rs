@@ -32,6 +32,9 @@ pub struct StateResult {
     /// Estimated errors of these; `None` where there is no estimate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub errors: Option<StateErrors>,
+    /// What the facets of curved surfaces change of these, about; `None` where none is curved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub facets_change: Option<StateErrors>,
 }
 
 /// Estimated errors of what a state says beside the objective: what true values have more, of vectors and phasors the length of that.

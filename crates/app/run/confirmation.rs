@@ -13,8 +13,9 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgr
 use fluxmorph_remesh::Moved;
 
 use super::estimate::{Estimate, Estimator, left_out};
+use super::facets::Shape;
 use super::finer::{Cut, FinerProblem, looked_at_once};
-use super::{Session, excess};
+use super::{Session, excess, reported};
 use crate::build::memory_limit;
 use crate::config::{Config, ElementOrder, Elements, Objective, SolverMethod, SourceMap};
 use crate::error::Error;
@@ -128,7 +129,7 @@ impl Session<'_> {
         let is_said = errors.is_some()
             || objective.is_verified_on_cut_elements()
             || self.is_geometry_looked_at() && self.is_checked(stop_reason);
-        let facets = if is_said { self.facets_of_run(objective, meshes, observer) } else { None };
+        let facets = if is_said { self.facets_of_run((objective, errors), meshes, observer) } else { None };
         let near_wall = is_said.then(|| self.near_wall_noted(observer)).flatten();
         let mut accuracy = Accuracy { facets, near_wall, excess, ..Accuracy::default() };
         let of_run = [objective.initial, objective.best];
@@ -192,18 +193,24 @@ impl Session<'_> {
     /// What the facets of a run change at its initial and its best shape.
     fn facets_of_run(
         &self,
-        objective: &ObjectiveResult,
+        (objective, errors): (&ObjectiveResult, Option<[f64; 2]>),
         meshes: &ShapeMeshes,
         observer: &mut dyn Observer,
     ) -> Option<CurvedFacets> {
         let [initial, best] = meshes.solved.each_ref();
-        let shapes = [(initial, objective.initial), (best, objective.best)];
+        let values = [objective.initial, objective.best];
+        let shapes = [initial, best].into_iter().enumerate().map(|(k, mesh)| Shape {
+            mesh,
+            objective: Some((values[k], errors.map(|errors| errors[k]))),
+            analysis: None,
+        });
+        let shapes: Vec<Shape<'_>> = shapes.collect();
         let shapes = match self.has_field_objective() && self.is_geometry_looked_at() {
             false => &[],
             true if initial.points() == best.points() => &shapes[..1],
             true => &shapes[..],
         };
-        self.facets_of(self.cut_shape(objective, meshes), shapes, observer)
+        Some(self.facets_of(self.cut_shape(objective, meshes), shapes, observer)?.facets)
     }
 
     /// Judges the gain of a run by the other values that are known of its objective, of which `corrected` are those without the
@@ -271,9 +278,12 @@ impl Session<'_> {
         None
     }
 
-    /// Whether what no estimate of the field has is looked at, whatever the order: where an objective is.
+    /// Whether what no estimate of the field has is looked at, whatever the order: where there is an objective, or something is
+    /// reported.
     pub(super) fn is_geometry_looked_at(&self) -> bool {
-        self.config.accuracy.estimate != Some(false) && self.config.objective.is_some()
+        let is_of_something =
+            self.config.objective.is_some() || reported::is_something(self.config, &self.setup.problem);
+        self.config.accuracy.estimate != Some(false) && is_of_something
     }
 
     /// Whether the objective has errors of the field; those of a volume or mass are its constraints'.

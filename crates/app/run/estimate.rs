@@ -195,14 +195,8 @@ impl<'a> Estimator<'a> {
         if of == Of::Objective {
             return Ok(Estimate { errors, of_states: Vec::new() });
         }
-        let reported = |problem: &Problem, analysis: &Analysis| -> Vec<Option<Reported>> {
-            let states = problem.states().iter().zip(&analysis.solutions);
-            let of = |(model, solution)| {
-                Reported::of((self.config, problem.bodies()), (model, &analysis.mesh, solution))
-            };
-            states.map(of).collect()
-        };
-        let pairs = reported(problem, analysis).into_iter().zip(reported(&finer.setup.problem, &found));
+        let own = Reported::of_states(self.config, problem, analysis);
+        let pairs = own.into_iter().zip(Reported::of_states(self.config, &finer.setup.problem, &found));
         let errors_of = |(own, better): (Reported, Reported)| own.errors(&better, OF_HALVED_EDGES);
         let of_states = pairs.map(|(own, better)| own.zip(better).and_then(errors_of)).collect();
         Ok(Estimate { errors, of_states })

@@ -3,7 +3,8 @@
 //! estimate of the field.
 //!
 //! What it does is found by trying: with the nodes of curved surfaces moved until the facets lie on these in the mean
-//! ([`CurvedSurfaces::onto_surfaces`]) bodies have the volume that they are meant to have, and the objective is computed once more.
+//! ([`CurvedSurfaces::onto_surfaces`]) bodies have the volume that they are meant to have, and the objective is computed once more, of
+//! an analysis what its states report too.
 
 use std::sync::Arc;
 
@@ -11,19 +12,23 @@ use fluxmorph_geometry::curved::CurvedSurfaces;
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_optimizer::Error as OptimizerError;
-use fluxmorph_optimizer::problem::SolverCache;
+use fluxmorph_optimizer::problem::{Analysis, Problem, SolverCache};
 
 use super::Session;
 use super::finer::{Cut, FinerProblem};
+use super::reported::Reported;
 use crate::build::{functionals, is_air, is_open, is_wound, memory_limit, remaining_nodes};
 use crate::config::Config;
 use crate::error::Error;
-use crate::files::{CurvedFacets, OverwritePolicy};
+use crate::files::{CurvedFacets, OverwritePolicy, SAFETY, StateErrors};
 use crate::show::Observer;
 
 /// Share of its volume that an element keeps at least when nodes move: where its facets are farther off than that, nodes go a part
 /// of the way, and the objective's change is taken to go on as it began.
 const KEPT_VOLUME: f64 = 0.5;
+
+/// Share of a value that facets may change beyond its error bar before this is a warning.
+const MATTERS: f64 = 0.01;
 
 /// The least part of the way: less would be noise of the linear solver.
 const LEAST_PART: f64 = 1.0 / 8.0;
@@ -52,6 +57,36 @@ impl From<OptimizerError> for NotMeasured {
     fn from(error: OptimizerError) -> Self {
         Self::Failed(error.into())
     }
+}
+
+/// A shape of which it is asked what its facets change.
+pub(super) struct Shape<'a> {
+    /// The mesh that it was solved on.
+    pub(super) mesh: &'a Mesh,
+    /// The objective on it, where that is of the field, with its estimated error where there is one [its unit].
+    pub(super) objective: Option<(f64, Option<f64>)>,
+    /// Its fields, where what they report is looked at too, with the estimated errors of that where there are some.
+    pub(super) analysis: Option<(&'a Analysis, Option<&'a [Option<StateErrors>]>)>,
+}
+
+/// What is found of facets.
+pub(super) struct Found {
+    /// Those farthest off their surface, with what all change of the objective.
+    pub(super) facets: CurvedFacets,
+    /// What all change of what the states of the last shape report.
+    pub(super) of_states: Vec<Option<StateErrors>>,
+}
+
+/// What the facets of a shape change.
+#[derive(Default)]
+struct Change {
+    /// Of the objective [its unit]; zero without one.
+    objective: f64,
+    of_states: Vec<Option<StateErrors>>,
+    /// Of what is reported that which changes most, with the change relative to it.
+    most: Option<(String, f64)>,
+    /// Whether something of it changes by more than its error bar.
+    exceeds: bool,
 }
 
 /// The facets of a mesh with all its regions, as it was read or generated.
@@ -144,8 +179,9 @@ fn designed_nodes(config: &Config, topology: &Topology) -> Vec<NodeId> {
     surfaces.flatten().flatten().copied().collect()
 }
 
-/// What no refinement takes away, in words; of these objectives of one design or of two.
-fn described(found: &CurvedFacets, objectives: &[f64]) -> String {
+/// What no refinement takes away, in words; of these objectives of one design or of two, and of what is reported that which changes
+/// most.
+fn described(found: &CurvedFacets, objectives: &[f64], most: Option<&(String, f64)>) -> String {
     let head = format!(
         "`{}` is curved, and its facets are up to {:.3} mm off it, at {}",
         found.surface,
@@ -153,60 +189,85 @@ fn described(found: &CurvedFacets, objectives: &[f64]) -> String {
         millimetres(found.at_m)
     );
     let percent = |change: f64, of: f64| format!("{:+.2} %", 100.0 * change / of.abs());
-    let what = match (found.change, objectives) {
+    let of_objective = match (found.change, objectives) {
         (Some([change, _]), &[objective]) => {
-            format!("on it in the mean they change the objective by about {}", percent(change, objective))
+            Some(format!("the objective by about {}", percent(change, objective)))
         }
-        (Some([first, last]), &[initial, best]) => format!(
-            "on it in the mean they change the objective by about {} at the initial and {} at the best design, relative to the \
-             larger of both, and F/F0 from {:.5} to {:.5}",
+        (Some([first, last]), &[initial, best]) => Some(format!(
+            "the objective by about {} at the initial and {} at the best design, relative to the larger of both, and F/F0 from {:.5} \
+             to {:.5}",
             percent(first, initial),
             percent(last, initial.abs().max(best.abs())),
             best / initial,
             (best + last) / (initial + first)
-        ),
-        _ => {
-            return format!(
-                "{head}: no error bar counts that, and refined meshes and cut elements keep the facets; begin with smaller faces there \
-                 to see what it does"
-            );
-        }
+        )),
+        _ => None,
     };
+    let of_reported = most.map(|(name, change)| {
+        format!("{name} by about {:.2} %, most of what is reported", 100.0 * change.abs())
+    });
+    let changed: Vec<String> = [of_objective, of_reported].into_iter().flatten().collect();
+    if changed.is_empty() {
+        return format!(
+            "{head}: no error bar counts that, and refined meshes and cut elements keep the facets; begin with smaller faces there \
+             to see what it does"
+        );
+    }
     format!(
-        "{head}: {what}, which no error bar counts and no refinement takes away; begin with smaller faces there"
+        "{head}: on it in the mean they change {}, which no error bar counts and no refinement takes away; begin with smaller faces \
+         there",
+        changed.join(", and ")
     )
 }
 
+/// Whether facets change an objective by more than its error bar, and by more than a share of it that matters.
+fn exceeds_the_bar(change: f64, (objective, error): (f64, Option<f64>)) -> bool {
+    error.is_some_and(|error| change.abs() > SAFETY * error.abs()) && change.abs() > MATTERS * objective.abs()
+}
+
 impl Session<'_> {
-    /// What no estimate and no refinement has of the geometry, initially and at a `shape` with facets of its own, with what it does
-    /// to the objective of some shapes, one or two, each the mesh that it was solved on; which is reported.
+    /// What no estimate and no refinement has of the geometry, initially and at a `cut` shape with facets of its own, with what it
+    /// does to some shapes, none to two; which is reported.
     pub(super) fn facets_of(
         &self,
-        shape: Option<&Mesh>,
-        shapes: &[(&Mesh, f64)],
+        cut: Option<&Mesh>,
+        shapes: &[Shape<'_>],
         observer: &mut dyn Observer,
-    ) -> Option<CurvedFacets> {
+    ) -> Option<Found> {
         let own = self.facets.farthest.clone();
-        let of_shape = shape.and_then(|mesh| farthest(self.config, mesh));
+        let of_shape = cut.and_then(|mesh| farthest(self.config, mesh));
         let off = |facets: &Option<CurvedFacets>| facets.as_ref().map_or(0.0, |facets| facets.off_m);
-        let mut found = if off(&of_shape) > off(&own) { of_shape } else { own }?;
+        let mut facets = if off(&of_shape) > off(&own) { of_shape } else { own }?;
+        let mut changes = Vec::new();
         if !shapes.is_empty() {
             observer.phase("measuring what the facets of curved surfaces change");
             match self.changes(shapes) {
-                Ok(changes) => found.change = Some([changes[0], changes[shapes.len() - 1]]),
+                Ok(found) => changes = found,
                 Err(why) => {
                     observer
                         .notice(&format!("what the facets of curved surfaces change is not known: {why}"));
                 }
             }
         }
-        let objectives: Vec<f64> = shapes.iter().map(|(_, objective)| *objective).collect();
-        observer.notice(&described(&found, &objectives));
-        Some(found)
+        let objectives: Vec<(f64, Option<f64>)> = shapes.iter().filter_map(|shape| shape.objective).collect();
+        if let ([first, ..], [_, ..]) = (&*changes, &*objectives) {
+            facets.change = Some([first.objective, changes[changes.len() - 1].objective]);
+        }
+        let exceeds =
+            changes.iter().zip(&objectives).any(|(change, of)| exceeds_the_bar(change.objective, *of));
+        let Change { of_states, most, exceeds: reported, .. } = changes.pop().unwrap_or_default();
+        let values: Vec<f64> = objectives.iter().map(|(value, _)| *value).collect();
+        let text = described(&facets, &values, most.as_ref());
+        if exceeds || reported {
+            observer.warning(&text)
+        } else {
+            observer.notice(&text)
+        }
+        Some(Found { facets, of_states })
     }
 
-    /// What the objectives of shapes have more [their unit] where the facets of all curved surfaces lie on these in the mean, about.
-    fn changes(&self, shapes: &[(&Mesh, f64)]) -> Result<Vec<f64>, NotMeasured> {
+    /// What shapes have more where the facets of all curved surfaces lie on these in the mean, about.
+    fn changes(&self, shapes: &[Shape<'_>]) -> Result<Vec<Change>, NotMeasured> {
         if self.setup.problem.share().is_some() {
             return Err(NotMeasured::OnRanks);
         }
@@ -216,15 +277,15 @@ impl Session<'_> {
         let remaining = remaining_nodes(config, full.topology());
         let designed = designed_nodes(config, full.topology());
         let of_full = first.onto_surfaces(config, full.points());
-        let of_shape = |shape: &Mesh| -> Vec<Point> {
+        let of_shape = |shape: &Shape<'_>| -> Vec<Point> {
             let mut points = full.points().to_vec();
-            remaining.iter().zip(shape.points()).for_each(|(node, point)| points[node.index()] = *point);
+            remaining.iter().zip(shape.mesh.points()).for_each(|(node, point)| points[node.index()] = *point);
             let mut motion = first.onto_surfaces(config, &points);
             designed.iter().for_each(|node| motion[node.index()] = of_full[node.index()]);
             remaining.iter().map(|node| motion[node.index()]).collect()
         };
-        let of_shapes: Vec<Vec<Point>> = shapes.iter().map(|(shape, _)| of_shape(shape)).collect();
-        let motions = shapes.iter().zip(&of_shapes).map(|((shape, _), motion)| (*shape, motion));
+        let of_shapes: Vec<Vec<Point>> = shapes.iter().map(of_shape).collect();
+        let motions = shapes.iter().zip(&of_shapes).map(|(shape, motion)| (shape.mesh, motion));
         let part = part_of_the_way(motions.chain([(full, &of_full)])).ok_or(NotMeasured::TooThin)?;
         let moved = |mesh: &Mesh, motion: &[Point]| {
             let motion: Vec<Point> = motion.iter().map(|m| m.map(|c| part * c)).collect();
@@ -236,19 +297,59 @@ impl Session<'_> {
         memory_limit::check_problem(&problem.setup.problem, self.source, OverwritePolicy::Keep)
             .map_err(Error::from)?;
         let (cache, mut changes) = (&mut SolverCache::default(), Vec::new());
-        for ((shape, objective), motion) in shapes.iter().zip(&of_shapes) {
+        for (shape, motion) in shapes.iter().zip(&of_shapes) {
             if motion.iter().all(|own| *own == [0.0; 3]) {
-                changes.push(0.0);
+                changes.push(Change::default());
                 continue;
             }
             check_interrupted()?;
-            let found = problem.analyse(&moved(shape, motion)?, cache)?.objective.unwrap_or(f64::NAN);
-            changes.push((found - objective) / part);
+            let found = problem.analyse(&moved(shape.mesh, motion)?, cache)?;
+            let of_problem = (&problem.setup.problem, &found);
+            let mut change =
+                shape.analysis.map_or_else(Change::default, |own| self.of_reported(own, of_problem, part));
+            if let Some((value, _)) = shape.objective {
+                change.objective = (found.objective.unwrap_or(f64::NAN) - value) / part;
+            }
+            changes.push(change);
         }
-        if changes.iter().all(|change: &f64| change.is_finite()) {
+        if changes.iter().all(|change| change.objective.is_finite()) {
             Ok(changes)
         } else {
             Err(NotMeasured::NotFinite)
+        }
+    }
+
+    /// What the states of an analysis report more on a mesh that is moved this part of the way.
+    fn of_reported(
+        &self,
+        (own, estimated): (&Analysis, Option<&[Option<StateErrors>]>),
+        (problem, moved): (&Problem, &Analysis),
+        part: f64,
+    ) -> Change {
+        let before = Reported::of_states(self.config, &self.setup.problem, own);
+        let after = Reported::of_states(self.config, problem, moved);
+        let mut change = Change::default();
+        for (state, (before, after)) in before.into_iter().zip(after).enumerate() {
+            let found = before.zip(after).and_then(|(own, on)| Some((own.errors(&on, 1.0 / part)?, own)));
+            if let Some((found, own)) = &found {
+                let bars = estimated.and_then(|all| Some(own.shares(all.get(state)?.as_ref()?)));
+                change.enter(own.shares(found), bars.as_deref());
+            }
+            change.of_states.push(found.map(|(found, _)| found));
+        }
+        change
+    }
+}
+
+impl Change {
+    /// Enters what a state reports more, as shares, beside the estimated errors of the same.
+    fn enter(&mut self, shares: Vec<(String, f64)>, estimated: Option<&[(String, f64)]>) {
+        for (k, (name, share)) in shares.into_iter().enumerate().filter(|(_, (_, share))| share.is_finite()) {
+            let bar = estimated.map(|all| SAFETY * all[k].1.abs());
+            self.exceeds |= bar.is_some_and(|bar| share.abs() > bar.max(MATTERS));
+            if share.abs() > self.most.as_ref().map_or(0.0, |(_, most)| most.abs()) {
+                self.most = Some((name, share));
+            }
         }
     }
 }

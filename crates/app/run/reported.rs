@@ -8,7 +8,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_optimizer::body::{Body, BodyForce};
-use fluxmorph_optimizer::problem::Problem;
+use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::circuit::{currents, direct_resistances, flux_linkages};
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
@@ -106,6 +106,46 @@ impl Reported {
             expansions,
             probes: probes(config, &locate(mesh, &points), (model, mesh, solution)),
         })
+    }
+
+    /// That of all states of an analysis.
+    pub(super) fn of_states(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<Option<Self>> {
+        let states = problem.states().iter().zip(&analysis.solutions);
+        states
+            .map(|(model, solution)| Self::of((config, problem.bodies()), (model, &analysis.mesh, solution)))
+            .collect()
+    }
+
+    /// Errors of losses, flux linkages, forces and the field at probes, relative to the largest of their kind, with their names.
+    pub(super) fn shares(&self, errors: &StateErrors) -> Vec<(String, f64)> {
+        let relative = |kind: &'static str, own: Vec<(&String, f64, f64)>| {
+            let largest = own.iter().map(|(_, value, _)| *value).fold(0.0, f64::max);
+            let of =
+                own.into_iter().map(move |(name, _, error)| (format!("{kind} `{name}`"), error / largest));
+            of.collect::<Vec<_>>()
+        };
+        let error = |of: Option<&f64>| of.copied().unwrap_or_default();
+        let losses = self.losses.iter();
+        let losses = losses.map(|(name, loss)| (name, loss.abs(), error(errors.losses_w.get(name))));
+        let linkages = self.flux_linkages.iter();
+        let linkages =
+            linkages.map(|(name, own)| (name, own.norm(), error(errors.flux_linkages_wb.get(name))));
+        let forces = self.forces.iter().map(|own| {
+            (&own.name, norm(own.force_n), error(errors.forces.get(&own.name).map(|own| &own.force_n)))
+        });
+        let probes = self.probes.iter().flat_map(|(name, points)| {
+            let errors = errors.probes_t.get(name).into_iter().flatten();
+            let size = |b: &[c64; 3]| b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+            let at = points.iter().zip(errors);
+            at.filter_map(move |(b, error)| Some((name, size(b.as_ref()?), (*error)?)))
+        });
+        let all = [
+            relative("the loss in", losses.collect()),
+            relative("the flux linkage of", linkages.collect()),
+            relative("the force on", forces.collect()),
+            relative("B at the probe", probes.collect()),
+        ];
+        all.concat()
     }
 
     /// The errors, so many times what a better field has more; `None` where one is no number.

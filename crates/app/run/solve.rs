@@ -1,21 +1,22 @@
 //! One analysis with its directory: the field of a single design.
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
 use fluxmorph_remesh::Moved;
 
 use super::estimate::Estimate;
 use super::excess::LeftOut;
+use super::facets::{Found, Shape};
 use super::finer::{Cut, FinerProblem};
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
+use super::reported;
 use super::summary::{constraints, design_result, enter_errors, homogeneity, terms};
 use super::{Options, Session};
 use crate::build::{Mode, memory_limit};
 use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
-use crate::files::{Accuracy, DesignFile, ObjectiveResult, RunResult, StopReason, exports};
+use crate::files::{Accuracy, DesignFile, ObjectiveResult, RunResult, StateErrors, StopReason, exports};
 use crate::show::RunObserver;
 
 /// Analyses one design and writes its field and result; on a mesh with all edges halved so many times, where its mesh is
@@ -127,7 +128,8 @@ impl Session<'_> {
         let broken = left_out.broken_bounds(problem, (analysis, &bounds), at_initial);
         broken.iter().for_each(|warning| observer.warning(warning));
         let excess = left_out.of_objective(problem, analysis);
-        let accuracy = self.accuracy_of((analysis, halvings), (estimate.as_ref(), excess), observer);
+        let (accuracy, of_facets) =
+            self.accuracy_of((analysis, halvings), (estimate.as_ref(), excess), observer);
         let mut result = RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
@@ -148,32 +150,47 @@ impl Session<'_> {
         if let Some(estimate) = estimate {
             result.enter_errors(&estimate.of_states);
         }
+        result.enter_facets(&of_facets);
         Ok(result)
     }
 
-    /// What is known of how exact the objective of an analysis is.
+    /// What is known of how exact the objective of an analysis is, and what facets change of what its states report.
     fn accuracy_of(
         &self,
         (analysis, halvings): (&Analysis, u32),
         (estimate, excess): (Option<&Estimate>, Option<f64>),
         observer: &mut dyn RunObserver,
-    ) -> Option<Accuracy> {
+    ) -> (Option<Accuracy>, Vec<Option<StateErrors>>) {
+        let of_states = estimate.map(|estimate| estimate.of_states.as_slice());
         let estimate = estimate.filter(|_| analysis.objective.is_some());
-        if estimate.is_none() && excess.is_none() && !self.is_geometry_looked_at() {
-            return None;
+        let is_looked_at = self.is_geometry_looked_at();
+        if estimate.is_none() && excess.is_none() && !is_looked_at {
+            return (None, Vec::new());
         }
         let objective = analysis.objective.filter(|_| self.has_field_objective());
-        let shapes: Vec<(&Mesh, f64)> = objective.iter().map(|&value| (&analysis.mesh, value)).collect();
+        let error = estimate.map(|estimate| estimate.errors.objective);
+        let shape = Shape {
+            mesh: &analysis.mesh,
+            objective: objective.map(|value| (value, error)),
+            analysis: reported::is_something(self.config, &self.setup.problem)
+                .then_some((analysis, of_states)),
+        };
+        let shapes = if shape.objective.is_some() || shape.analysis.is_some() { &[shape][..] } else { &[] };
+        let (facets, of_states) = match self.facets_of(None, shapes, observer) {
+            Some(Found { facets, of_states }) => (Some(facets), of_states),
+            None => (None, Vec::new()),
+        };
         let known = Accuracy {
             refinements: halvings as usize,
-            facets: self.facets_of(None, &shapes, observer),
+            facets,
             near_wall: self.near_wall_noted(observer),
             excess: excess.map(|excess| [excess; 2]),
             ..Accuracy::default()
         };
-        match (objective, estimate) {
-            (Some(value), Some(estimate)) => Some(known.of_analysis(value, estimate.errors.objective)),
+        let accuracy = match objective.zip(error) {
+            Some((value, error)) => Some(known.of_analysis(value, error)),
             _ => Some(known).filter(Accuracy::says_something_of_the_geometry),
-        }
+        };
+        (accuracy, of_states)
     }
 }

@@ -82,6 +82,7 @@ impl Session<'_> {
             losses_w,
             forces,
             errors: None,
+            facets_change: None,
             saturation,
             states: if states.len() > 1 { states } else { Vec::new() },
             initial: Vec::new(),

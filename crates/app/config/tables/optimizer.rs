@@ -35,8 +35,9 @@ table! {
         /// No evaluation is started after this time [s]. Default: no limit.
         max_time: Option<f64> = quantity(Duration, POSITIVE);
         /// Stop when the objective changes by less than this fraction between iterations, and the gradient, less what bounds and
-        /// constraints hold of it, promises no more than ten times that: while it does, the search goes on from its best design. 0:
-        /// off. The default is well below the error of the mesh.
+        /// constraints hold of it, promises no more than ten times that: while it does, the search goes on from its best design, and
+        /// where it promises more than a hundred times that with a tenth of the tolerance, three times at most. 0: off. The default
+        /// is well below the error of the mesh.
         ftol_rel: f64 = number(FRACTIONS) => Settings::DEFAULT.ftol_rel;
         /// Stop when all variables change by less than this fraction; 0: off. It is off by default, since the variables of a
         /// design at its bounds get there long before the rest has settled.
@@ -63,7 +64,8 @@ choice! {
         Slsqp = "slsqp",
         /// Limited-memory BFGS.
         Lbfgs = "lbfgs",
-        /// Truncated Newton with restarts and preconditioning.
+        /// Truncated Newton with restarts and preconditioning. Most of its evaluations are differences of the gradient over a hair's
+        /// breadth, products with the Hessian that leave the design where it is.
         Tnewton = "tnewton",
         /// Limited-memory variable metric of rank 2.
         Var2 = "var2",

@@ -13,6 +13,9 @@ use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::{Combination, Goal};
 use crate::problem::{Problem, Shape, SolverCache, Timings};
 
+/// Share of the initial objective below which what is left is taken for rounding: a millionth of a field, squared.
+const VANISHED: f64 = 1e-12;
+
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
     pub(super) problem: &'a mut Problem,
@@ -259,6 +262,11 @@ impl<'a> Run<'a> {
     pub(super) fn promised_gains(&self) -> Option<[f64; 2]> {
         let best = self.best.as_ref()?;
         Some([self.promised?, self.promised_gain(&best.sample, &best.values)])
+    }
+
+    /// Whether what is left of the initial objective is rounding.
+    pub(super) fn has_vanished(&self) -> bool {
+        self.best.as_ref().is_some_and(|best| best.sample.value.abs() < VANISHED)
     }
 
     /// Why a run ends whose mesh motion or field fails between two searches: what was reached is saved.

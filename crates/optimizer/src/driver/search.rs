@@ -34,7 +34,12 @@ const STILL_PROMISED: f64 = 0.1;
 /// for four evaluations in vain.
 const PROMISED_TOLERANCES: f64 = 10.0;
 
-/// How often an end after the cautious first step is not believed.
+/// Multiple of the tolerance that the gradient may promise where a search that has gained nothing is believed. A method that begins
+/// anew knows no curvature, and its first steps gain little: quasi-Newton methods and SQP ended so where the objective was to fall to a
+/// third and to a seventh, and the gradient promised three to five thousand times the tolerance.
+const BELIEVED_TOLERANCES: f64 = 100.0;
+
+/// How often an end after the cautious first step, or with much promised, is not believed.
 const MAX_TIGHTENINGS: usize = 3;
 
 /// How one search of the method ended.
@@ -158,30 +163,55 @@ impl<'a> Search<'a> {
         }
         // A method that was given nothing new will not be at its next start either.
         let is_stuck = run.is_held_back && evaluations == 0;
-        let is_cautious = ending == Ending::Objective && evaluations <= CAUTIOUS && !is_stuck;
-        if is_cautious && self.ftol_rel > 0.0 && self.tightenings < MAX_TIGHTENINGS {
+        let may_tighten = self.ftol_rel > 0.0 && self.tightenings < MAX_TIGHTENINGS && !is_stuck;
+        if ending == Ending::Objective && evaluations <= CAUTIOUS && may_tighten {
             return NextStep::TightenTolerance;
         }
         let held_back = self.trust.holds_back(run.shape(), &run.centre());
         match &self.refused {
             _ if held_back && gained => NextStep::MoveTrustRegion,
-            _ if ending == Ending::Objective && gained && self.still_promises(run) => NextStep::SearchOn,
+            _ if ending == Ending::Objective
+                && gained
+                && self.promised(run, PROMISED_TOLERANCES).is_some() =>
+            {
+                NextStep::SearchOn
+            }
+            _ if ending == Ending::Objective
+                && may_tighten
+                && self.promised(run, BELIEVED_TOLERANCES).is_some() =>
+            {
+                NextStep::TightenTolerance
+            }
             Some(refusal) if held_back && self.trust.scale < 1.0 => {
                 self.after_refusal(run, refusal.clone(), gained)
             }
             _ => NextStep::Stop(match ending {
                 Ending::Roundoff => StopReason::RoundoffLimited,
                 _ if run.is_held_back || self.is_throttled(run) => StopReason::MeshLimited,
-                Ending::Objective | Ending::Entered => StopReason::ObjectiveConverged,
+                Ending::Objective | Ending::Entered => {
+                    self.warn_of_promise(run);
+                    StopReason::ObjectiveConverged
+                }
                 Ending::Step => StopReason::StepConverged,
             }),
         }
     }
 
-    /// Whether the gradient promises many times the tolerance by which the method has ended.
-    fn still_promises(&self, run: &Run<'_>) -> bool {
-        let promised = run.promised_gains().filter(|_| !run.violates() && !run.is_held_back);
-        promised.is_some_and(|[_, now]| now > PROMISED_TOLERANCES * self.settings.ftol_rel)
+    /// What the gradient promises where that is more than so many times the tolerance by which the method has ended.
+    fn promised(&self, run: &Run<'_>, tolerances: f64) -> Option<f64> {
+        let [_, now] = run.promised_gains().filter(|_| !run.violates() && !run.is_held_back)?;
+        (now > tolerances * self.settings.ftol_rel && !run.has_vanished()).then_some(now)
+    }
+
+    /// Says what the gradient still promises where a search is believed all the same.
+    fn warn_of_promise(&self, run: &mut Run<'_>) {
+        let promised = self.promised(run, BELIEVED_TOLERANCES).filter(|_| self.ftol_rel > 0.0);
+        if let Some(promised) = promised {
+            run.warn(&format!(
+                "the search came to its tolerance while the gradient still promises {:.0} % of the objective, if the whole range of the                  design had the slope of this one: another method, or a run that begins with this design, tells whether that is to be had",
+                100.0 * promised
+            ));
+        }
     }
 
     /// Whether the method came to its tolerance only because the trust region is small, which is said then.
@@ -216,12 +246,18 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Continues with a tighter tolerance after a cautious first step.
+    /// Continues with a tighter tolerance after a cautious first step, or where the gradient promises much.
     pub(super) fn tighten_tolerance(&mut self, run: &mut Run<'_>) {
         self.tightenings += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
         let plan = format!(": the search goes on with a relative tolerance of {:.0e}", self.ftol_rel);
-        run.note_going_on("the method ended after a few evaluations", &plan);
+        let what = match self.promised(run, BELIEVED_TOLERANCES) {
+            Some(promised) => {
+                format!("the gradient still promises {:.0} % of the objective", 100.0 * promised)
+            }
+            None => "the method ended after a few evaluations".to_owned(),
+        };
+        run.note_going_on(&what, &plan);
     }
 
     /// Continues with the worst constraint as the objective.
