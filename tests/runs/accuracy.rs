@@ -155,6 +155,13 @@ fn what_facets_change_is_what_a_closed_form_has_more() {
     println!("missing {missing:.2} W, error {error:.2} W, facets {change:.2} W");
     assert!(missing > 2.0 * error.abs());
     assert!((missing - error - change).abs() < 0.1 * missing);
+    // Without an objective it is said of what is reported, with the wall that is near.
+    let without =
+        [far, "accuracy.estimate=true"].iter().fold(shipped("sphere", &[]), |device, set| device.with(set));
+    finish(without.command("solve", &out).arg("--force"))
+        .says(&["warning: `air|sphere` is curved", "they change the loss in `sphere` by about 3."]);
+    let reported = number(&read_json(&out.join("result.json")), "/facets_change/losses_w/sphere");
+    assert!((reported / change - 1.0).abs() < 1e-6, "{reported} {change}");
 }
 
 /// A tolerance that so many refinements do not keep: the run says so, and what would.

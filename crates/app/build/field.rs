@@ -378,8 +378,9 @@ pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
                 "the region branches, or its cross-section changes along the way, and strands of one current density do not fit it: \
                  give each winding a region of its own, or set conductor = \"solid\" where currents may part"
             } else {
-                "that is noise from element to element where the winding bends: an inductance in air is off by about a tenth of \
-                 it, beside iron by far less, and a finer mesh of the winding has less"
+                "where the winding bends its current is off from element to element, and as a whole nearer to the inside: fields, \
+                 inductances, losses and forces that it makes in air are off by about a tenth of that, which no error bar counts, \
+                 beside iron by far less; a finer mesh of the winding has less, and `shape` in place of `region` none"
             };
             (is_branched || !is_smooth).then(|| format!("coil `{}`: {report}; {meaning}", coil.name))
         }

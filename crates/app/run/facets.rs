@@ -27,6 +27,9 @@ use crate::show::Observer;
 /// of the way, and the objective's change is taken to go on as it began.
 const KEPT_VOLUME: f64 = 0.5;
 
+/// Share of a value below which nothing is said of its change.
+const LITTLE: f64 = 5e-5;
+
 /// Share of a value that facets may change beyond its error bar before this is a warning.
 const MATTERS: f64 = 0.01;
 
@@ -255,7 +258,14 @@ impl Session<'_> {
         }
         let exceeds =
             changes.iter().zip(&objectives).any(|(change, of)| exceeds_the_bar(change.objective, *of));
+        let is_little =
+            |(change, (value, _)): (&Change, &(f64, _))| change.objective.abs() < LITTLE * value.abs();
+        let is_known = !changes.is_empty();
+        let little = is_known && changes.iter().zip(&objectives).all(is_little);
         let Change { of_states, most, exceeds: reported, .. } = changes.pop().unwrap_or_default();
+        if little && most.as_ref().is_none_or(|(_, share)| share.abs() < LITTLE) {
+            return Some(Found { facets, of_states });
+        }
         let values: Vec<f64> = objectives.iter().map(|(value, _)| *value).collect();
         let text = described(&facets, &values, most.as_ref());
         if exceeds || reported {

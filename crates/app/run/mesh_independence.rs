@@ -283,13 +283,13 @@ fn analysis_at(
     Ok(problem.analyse(moved, Derivatives::None, cache, &mut NoProgress)?)
 }
 
-/// How far a value is from its bound, as a share of this where it is none of zero.
+/// How far a value is above or below its bound, as a share of this where it is none of zero.
 fn excess(beyond: f64, bound: f64) -> String {
-    let share = beyond / bound.abs();
-    match share.abs() {
-        share_size if !share_size.is_finite() => format!("{beyond:+.1e} in its unit"),
-        1e-4.. => format!("{:+.2} % from its bound", 100.0 * share),
-        _ => format!("{share:+.1e} of its bound"),
+    let side = if beyond > 0.0 { "above" } else { "below" };
+    match (beyond / bound).abs() {
+        share if !share.is_finite() => format!("{:.1e} in its unit {side} its bound", beyond.abs()),
+        share @ 1e-4.. => format!("{:.2} % {side} its bound", 100.0 * share),
+        share => format!("{share:.1e} of its bound {side} it"),
     }
 }
 

@@ -161,7 +161,7 @@ fn head_of_state(result: &RunResult) -> &'static str {
 pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
     let states = State::all(result);
     html! {
-        (constraints(&result.constraints, &data.config.constraints))
+        (constraints(result, &data.config.constraints))
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
         (circuits(result))
         (harmonics::figures(&data.config, result))
@@ -179,18 +179,28 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
     }
 }
 
-fn constraints(results: &[ConstraintResult], constraints: &[Constraint]) -> Markup {
+fn constraints(result: &RunResult, constraints: &[Constraint]) -> Markup {
+    let checked = result.objective.as_ref().and_then(|objective| objective.verification.as_ref());
+    let checked: &[ConstraintResult] = checked.map_or(&[], |found| &found.constraints);
+    let verdict = |c: &ConstraintResult| if c.satisfied { "satisfied" } else { "violated" };
     let row = |c: &ConstraintResult| {
-        let verdict = if c.satisfied { "satisfied" } else { "violated" };
         let (unit, factor) = constraint_unit(&c.name, constraints);
+        let on_other = checked.iter().find(|own| own.name == c.name);
+        let on_other =
+            on_other.map(|own| format!("{} {unit}, {}", number(factor * own.value, 5), verdict(own)));
         let [value, bound] = [c.value, c.bound].map(|v| format!("{} {unit}", number(factor * v, 5)));
         let bar =
             c.error_estimate.map(|error| format!("± {} {unit}", number(factor * SAFETY * error.abs(), 2)));
-        vec![c.name.clone(), value, bar.unwrap_or_default(), bound, verdict.to_owned()]
+        let mut row = vec![c.name.clone(), value, bar.unwrap_or_default(), bound, verdict(c).to_owned()];
+        if !checked.is_empty() {
+            row.push(on_other.unwrap_or_default());
+        }
+        row
     };
-    let rows: Vec<Vec<String>> = results.iter().map(row).collect();
-    let head = ["constraint", "value", ERROR_BAR, "bound", ""];
-    titled_table("Constraints at the best design", &head, &rows, MOST_ROWS)
+    let rows: Vec<Vec<String>> = result.constraints.iter().map(row).collect();
+    let head = ["constraint", "value", ERROR_BAR, "bound", "", "on the other mesh"];
+    let columns = if checked.is_empty() { 5 } else { 6 };
+    titled_table("Constraints at the best design", &head[..columns], &rows, MOST_ROWS)
 }
 
 /// The unit that a constraint is shown in, and its number in one of SI.

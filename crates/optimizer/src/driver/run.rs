@@ -235,6 +235,7 @@ impl<'a> Run<'a> {
         self.last.clone_from(&record.design);
         if self.promised.is_none() {
             self.promised = Some(self.promised_gain(&sample, &record.design));
+            self.note_violations(&sample);
         }
         self.latest = Some(sample.clone());
         self.repeated = 0;
@@ -251,6 +252,20 @@ impl<'a> Run<'a> {
         }
         let (goal, values) = (self.goal, self.incumbent_values());
         self.near_misses.retain(|miss| values.is_none_or(|best| miss.gain(goal, best).is_some()));
+    }
+
+    /// Says which bounds the initial design does not keep.
+    fn note_violations(&mut self, initial: &Sample) {
+        let named = self.problem.constraints().iter().zip(&initial.constraints);
+        let broken =
+            named.filter(|(_, (excess, _))| *excess > CONSTRAINT_TOLERANCE && self.first_evaluation == 0);
+        let broken: Vec<String> = broken.map(|(own, _)| format!("`{}`", own.name)).collect();
+        if !broken.is_empty() {
+            self.observer.note(&format!(
+                "the initial design violates {}: designs that keep it come first, whatever their objective",
+                broken.join(", ")
+            ));
+        }
     }
 
     fn promised_gain(&self, sample: &Sample, design: &[f64]) -> f64 {
