@@ -214,12 +214,12 @@ fn a_search_goes_on_while_the_gradient_promises_many_times_the_tolerance() {
 #[test]
 fn a_search_that_begins_anew_is_not_believed_where_the_gradient_promises_much() {
     let coarse = ("\"15 mm\", \"15 mm\", \"10 mm\"", "\"20 mm\", \"20 mm\", \"20 mm\"");
-    for algorithm in [Algorithm::Lbfgs, Algorithm::Slsqp] {
+    for (algorithm, ended) in [(Algorithm::Lbfgs, 1.704e-4), (Algorithm::Slsqp, 1.411e-4)] {
         let search = |s| Optimizer { algorithm, max_evaluations: 80, ftol_rel: 1e-2, ..s };
         let (run, _) = with("pole.toml", &[coarse, ("order = 2", "order = 1")], search);
         let ratio = run.best.objective / run.initial;
         println!("{algorithm:?}: F/F0 {ratio:.3e}, {:?}", run.stop_reason);
-        assert!(ratio < 1.2e-4 && run.stop_reason == StopReason::MaxEvaluations, "{algorithm:?}: {ratio:e}");
+        assert!(ratio < 0.9 * ended && run.stop_reason == StopReason::MaxEvaluations, "{algorithm:?}: {ratio:e}");
     }
 }
 

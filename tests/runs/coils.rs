@@ -280,3 +280,57 @@ fn two_currents_in_one_region_are_asked_about() {
     let said = json["warnings"].to_string();
     assert!(said.contains("`bar` and `back` fill the same region `bar`"), "{said}");
 }
+
+/// A right-angled bend between planes of equal potential.
+const BEND: &str = r#"
+[mesh]
+generator = "boxes"
+[mesh.boxes]
+box = [["0 mm", "0 mm", "0 mm"], ["30 mm", "30 mm", "20 mm"]]
+growth = 2
+[[mesh.boxes.regions]]
+name = "bend"
+box = [["0 mm", "0 mm", "0 mm"], ["30 mm", "10 mm", "5 mm"]]
+size = "5 mm"
+[[mesh.boxes.regions]]
+name = "bend"
+box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "30 mm", "5 mm"]]
+size = "5 mm"
+[analysis]
+frequency = 0
+[materials.copper]
+conductivity = "58e6 S/m"
+[regions.bend]
+material = "copper"
+[[coils]]
+name = "bend"
+region = "bend"
+conductor = "solid"
+voltage = "1 mV"
+terminals = ["x_max", "y_max"]
+[boundaries]
+flux_parallel = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
+"#;
+
+/// Linear conduction takes 2.5 % off the resistance of a bend, and has a current that is too large by that; both are in the bars.
+#[test]
+fn the_resistance_of_a_bend_has_an_error_bar_and_so_has_the_current_at_a_voltage() {
+    let home = folder();
+    let path = home.path().join("bend.toml");
+    std::fs::write(&path, BEND).expect("written");
+    let out = home.path().join("out");
+    let said = fluxmorph(&[&"solve", &path, &"--out", &out]).completed().stdout;
+    assert!(said.contains(" ohm (estimated)") && said.contains(" A (estimated)"), "{said}");
+    let found = read_json(&out.join("result.json"));
+    // In the corner there are 1 - (2/pi) ln 2 squares.
+    let resistance = (5.0 - 2.0 / std::f64::consts::PI * 2.0_f64.ln()) / (58e6 * 5e-3);
+    for (key, error, exact) in [
+        ("resistance_ohm", &found["errors"]["resistances_ohm"]["bend"], resistance),
+        ("current_a", &found["errors"]["currents_a"]["bend"], 1e-3 / resistance),
+    ] {
+        let missing = (exact - number(&found["coils"][0][key])).abs();
+        let error = number(error).abs();
+        println!("{key}: {error:e} of {missing:e}");
+        assert!(missing > 0.01 * exact && error < missing && missing < 1.5 * error, "{key}: {error} {missing}");
+    }
+}

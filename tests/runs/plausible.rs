@@ -294,7 +294,7 @@ fn a_winding_that_branches_is_no_noise() {
         let checked = finish(&mut command(&[&"check", &path])).exits_with(0);
         checked.stdout + &checked.stderr
     };
-    let (branched, noise) = ("the region branches", "noise from element to element");
+    let (branched, noise) = ("the region branches", "off from element to element");
     let text = notices(FRAME);
     assert!(text.contains(branched) && !text.contains(noise), "{text}");
     // A frame with one window bends four times, and no more.

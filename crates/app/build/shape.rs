@@ -263,10 +263,7 @@ pub(super) fn shape(
     let mut faults = overlap_faults(inputs, motion.moving(), models, observed);
     let moves = |node: NodeId| may_move(&surface, motion.map(), node);
     faults.extend(
-        models
-            .iter()
-            .find_map(|model| Some((model, model.torn_source(moves)?)))
-            .map(|(model, e)| source_fault(inputs, config, (model, e))),
+        models.iter().find_map(|model| model.torn_source(moves)).map(|e| source_fault(inputs, config, e)),
     );
     if faults.is_empty() {
         faults.extend(held_node_fault(inputs, &surface, motion.map(), &models[0]));
@@ -385,41 +382,26 @@ fn overlap_faults(
     faults
 }
 
-/// A coil in an element that would move, or an end of its window.
-fn source_fault(
-    inputs: &Inputs<'_>,
-    config: &Config,
-    (model, element): (&FieldModel, ElementId),
-) -> Diagnostic {
+/// A coil, or an end of its window, in an element that would move.
+fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Diagnostic {
     let Inputs { source, mesh, .. } = *inputs;
-    let at = millimetres(centroid(mesh.vertices(element)));
-    let place = &coil_at(config, mesh, element);
-    let is_window = model.is_in_window(element);
-    let message = if is_window {
-        let region = mesh.topology().region_name_at(element);
-        format!("nodes at the end of a coil's window would move, at {at} in `{region}`")
-    } else {
-        format!("a coil reaches into the remesh region, at {at}")
-    };
-    let fault = source.diagnostic(place, message);
+    let (at, region) =
+        (millimetres(centroid(mesh.vertices(element))), mesh.topology().region_name_at(element));
+    let fault = source.diagnostic(
+        &coil_at(config, mesh, element),
+        format!("a coil reaches into an element with nodes that move, at {at} in `{region}`"),
+    );
     if region_coil_at(config, mesh, element).is_some_and(|i| config.coils[i].is_solid()) {
         return fault.expected("a frequency above 0 Hz").help(
             "at 0 Hz the current of a solid conductor is that of conduction in the initial shape, and must not move; a low \
              frequency has the same field, and follows the shape",
         );
     }
-    let (expected, cure) = if is_window {
-        (
-            "what moves in a window to lie inside of it: at its ends the coil stays",
-            "make what is in the window a region of its own outside of the remesh region, or end what moves before the ends",
-        )
-    } else {
-        (
-            "a remesh region that no winding reaches into: a coil does not move with the mesh",
-            "shrink the remesh region, or move the coil; of a coil that is a region of the mesh only that has to stay",
-        )
-    };
-    let fault = fault.expected(expected);
+    let fault = fault.expected(
+        "a remesh region without nodes of elements that a winding or an end of its window cuts: a coil does not move with the mesh",
+    );
+    let cure = "shrink the remesh region, or make what is in the coil's window a region of its own that stays; of a coil that is a \
+                region of the mesh only that has to stay";
     fault.help(match plausible::unit_hint(config, inputs.full_mesh) {
         Some(hint) => format!("{hint}; else {cure}"),
         None => cure.to_owned(),

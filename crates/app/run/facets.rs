@@ -223,9 +223,13 @@ fn described(found: &CurvedFacets, objectives: &[f64], most: Option<&(String, f6
     )
 }
 
-/// Whether facets change an objective by more than its error bar, and by more than a share of it that matters.
-fn exceeds_the_bar(change: f64, (objective, error): (f64, Option<f64>)) -> bool {
-    error.is_some_and(|error| change.abs() > SAFETY * error.abs()) && change.abs() > MATTERS * objective.abs()
+/// Whether facets change objectives, of one design or of two, by more than an error bar, and by more than a share of the larger one that
+/// matters.
+fn exceeds_a_bar(changes: &[Change], objectives: &[(f64, Option<f64>)]) -> bool {
+    let largest = objectives.iter().map(|(value, _)| value.abs()).fold(0.0, f64::max);
+    changes.iter().zip(objectives).any(|(Change { objective: change, .. }, (_, error))| {
+        change.abs() > (SAFETY * error.unwrap_or_default().abs()).max(MATTERS * largest)
+    })
 }
 
 impl Session<'_> {
@@ -256,14 +260,13 @@ impl Session<'_> {
         if let ([first, ..], [_, ..]) = (&*changes, &*objectives) {
             facets.change = Some([first.objective, changes[changes.len() - 1].objective]);
         }
-        let exceeds =
-            changes.iter().zip(&objectives).any(|(change, of)| exceeds_the_bar(change.objective, *of));
+        let exceeds = exceeds_a_bar(&changes, &objectives);
         let is_little =
             |(change, (value, _)): (&Change, &(f64, _))| change.objective.abs() < LITTLE * value.abs();
-        let is_known = !changes.is_empty();
-        let little = is_known && changes.iter().zip(&objectives).all(is_little);
+        let of_objective = !changes.is_empty() && changes.iter().zip(&objectives).all(is_little);
         let Change { of_states, most, exceeds: reported, .. } = changes.pop().unwrap_or_default();
-        if little && most.as_ref().is_none_or(|(_, share)| share.abs() < LITTLE) {
+        let of_reported = most.as_ref().map_or(!objectives.is_empty(), |(_, share)| share.abs() < LITTLE);
+        if of_objective && of_reported {
             return Some(Found { facets, of_states });
         }
         let values: Vec<f64> = objectives.iter().map(|(value, _)| *value).collect();
@@ -352,11 +355,12 @@ impl Session<'_> {
 }
 
 impl Change {
-    /// Enters what a state reports more, as shares, beside the estimated errors of the same.
+    /// Enters what a state reports more, as shares, beside the estimated errors of the same. What changes by more than itself cancels,
+    /// and says nothing of the facets.
     fn enter(&mut self, shares: Vec<(String, f64)>, estimated: Option<&[(String, f64)]>) {
-        for (k, (name, share)) in shares.into_iter().enumerate().filter(|(_, (_, share))| share.is_finite()) {
-            let bar = estimated.map(|all| SAFETY * all[k].1.abs());
-            self.exceeds |= bar.is_some_and(|bar| share.abs() > bar.max(MATTERS));
+        for (k, (name, share)) in shares.into_iter().enumerate().filter(|(_, (_, share))| share.abs() < 1.0) {
+            let bar = estimated.map_or(0.0, |all| SAFETY * all[k].1.abs());
+            self.exceeds |= share.abs() > bar.max(MATTERS);
             if share.abs() > self.most.as_ref().map_or(0.0, |(_, most)| most.abs()) {
                 self.most = Some((name, share));
             }

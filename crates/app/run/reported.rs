@@ -3,6 +3,8 @@
 //! The estimate of the objective has that field at hand; a second evaluation of losses, forces, currents, flux linkages, expansions and
 //! probes on it costs next to nothing. Does not live here: the fields (`estimate`) and what is written of a state (`summary`).
 
+use std::collections::BTreeMap;
+
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
@@ -89,6 +91,15 @@ pub(super) fn expansions(
     config.multipoles.iter().map(of).collect()
 }
 
+/// A name, the size of its value, and the error of that.
+type Entry = (String, f64, f64);
+
+/// Errors relative to the largest value.
+fn shares_of(kind: &str, entries: Vec<Entry>) -> Vec<(String, f64)> {
+    let largest = entries.iter().map(|(_, value, _)| *value).fold(0.0, f64::max);
+    entries.into_iter().map(|(name, _, error)| (format!("{kind} `{name}`"), error / largest)).collect()
+}
+
 impl Reported {
     /// That of a field; `None` where an expansion cannot be had of it.
     pub(super) fn of(
@@ -116,36 +127,46 @@ impl Reported {
             .collect()
     }
 
-    /// Errors of losses, flux linkages, forces and the field at probes, relative to the largest of their kind, with their names.
+    /// Errors of losses, currents, resistances, flux linkages, forces, expansions and the field at probes, relative to the largest of
+    /// their kind, with their names: as many for whatever errors, in one order; zero where there is none, NaN of a point outside.
     pub(super) fn shares(&self, errors: &StateErrors) -> Vec<(String, f64)> {
-        let relative = |kind: &'static str, own: Vec<(&String, f64, f64)>| {
-            let largest = own.iter().map(|(_, value, _)| *value).fold(0.0, f64::max);
-            let of =
-                own.into_iter().map(move |(name, _, error)| (format!("{kind} `{name}`"), error / largest));
-            of.collect::<Vec<_>>()
+        let of =
+            |errors: &BTreeMap<String, f64>, name: &String| errors.get(name).copied().unwrap_or_default();
+        let amplitudes = |own: &[(String, c64)], errors: &BTreeMap<String, f64>| -> Vec<Entry> {
+            own.iter().map(|(name, own)| (name.clone(), own.norm(), of(errors, name))).collect()
         };
-        let error = |of: Option<&f64>| of.copied().unwrap_or_default();
-        let losses = self.losses.iter();
-        let losses = losses.map(|(name, loss)| (name, loss.abs(), error(errors.losses_w.get(name))));
-        let linkages = self.flux_linkages.iter();
-        let linkages =
-            linkages.map(|(name, own)| (name, own.norm(), error(errors.flux_linkages_wb.get(name))));
-        let forces = self.forces.iter().map(|own| {
-            (&own.name, norm(own.force_n), error(errors.forces.get(&own.name).map(|own| &own.force_n)))
-        });
-        let probes = self.probes.iter().flat_map(|(name, points)| {
-            let errors = errors.probes_t.get(name).into_iter().flatten();
+        let numbers = |own: &[(String, f64)], errors: &BTreeMap<String, f64>| -> Vec<Entry> {
+            own.iter().map(|(name, own)| (name.clone(), own.abs(), of(errors, name))).collect()
+        };
+        let force = |own: &BodyForce| {
+            let error = errors.forces.get(&own.name).map_or(0.0, |error| error.force_n);
+            (own.name.clone(), norm(own.force_n), error)
+        };
+        let mut all = [
+            shares_of("the loss in", numbers(&self.losses, &errors.losses_w)),
+            shares_of("the current of", amplitudes(&self.currents, &errors.currents_a)),
+            shares_of("the resistance of", numbers(&self.resistances, &errors.resistances_ohm)),
+            shares_of("the flux linkage of", amplitudes(&self.flux_linkages, &errors.flux_linkages_wb)),
+            shares_of("the force on", self.forces.iter().map(force).collect()),
+        ]
+        .concat();
+        for (set, terms) in &self.expansions {
+            let own = errors.multipoles_t.get(set);
+            let error = |term: &Harmonic| own.map_or(0.0, |errors| of(errors, &term.to_string()));
+            let terms = terms.iter().map(|(term, value)| (set.clone(), value.norm(), error(term)));
+            all.extend(shares_of("a term of", terms.collect()));
+        }
+        for (probe, points) in &self.probes {
+            let own = errors.probes_t.get(probe);
+            let error = |k: usize| own.and_then(|errors| *errors.get(k)?).unwrap_or(f64::NAN);
             let size = |b: &[c64; 3]| b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
-            let at = points.iter().zip(errors);
-            at.filter_map(move |(b, error)| Some((name, size(b.as_ref()?), (*error)?)))
-        });
-        let all = [
-            relative("the loss in", losses.collect()),
-            relative("the flux linkage of", linkages.collect()),
-            relative("the force on", forces.collect()),
-            relative("B at the probe", probes.collect()),
-        ];
-        all.concat()
+            let points = points
+                .iter()
+                .enumerate()
+                .map(|(k, b)| (probe.clone(), b.as_ref().map_or(0.0, size), error(k)));
+            all.extend(shares_of("B at the probe", points.collect()));
+        }
+        all
     }
 
     /// The errors, so many times what a better field has more; `None` where one is no number.
@@ -183,14 +204,14 @@ impl Reported {
                 .currents
                 .iter()
                 .zip(&better.currents)
-                .filter(|((_, own), (_, more))| (more - own).norm() > ROUNDING * own.norm())
+                .filter(|((_, own), (_, more))| !((more - own).norm() <= ROUNDING * own.norm()))
                 .map(amplitude)
                 .collect(),
             resistances_ohm: self
                 .resistances
                 .iter()
                 .zip(&better.resistances)
-                .filter(|((_, own), (_, more))| (more - own).abs() > ROUNDING * own)
+                .filter(|((_, own), (_, more))| !((more - own).abs() <= ROUNDING * own))
                 .map(number)
                 .collect(),
             flux_linkages_wb: self.flux_linkages.iter().zip(&better.flux_linkages).map(amplitude).collect(),

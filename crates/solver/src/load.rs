@@ -60,11 +60,6 @@ impl Sources {
         self.coils.fixed_elements().find(|&e| moved(e).next().is_some()).or_else(window)
     }
 
-    /// Whether an element is in the window of a coil.
-    pub(crate) fn is_in_window(&self, element: ElementId) -> bool {
-        self.coils.window(element).is_some()
-    }
-
     /// `fᵀu` of the load and the coefficients of a solution: of the load of 1 A, its flux linkage [Wb].
     pub(crate) fn linkage(&self, space: &Space, mesh: &Mesh, field: impl Fn(ElementId) -> Local) -> c64 {
         let mut sum = c64::default();

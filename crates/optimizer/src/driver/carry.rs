@@ -14,8 +14,8 @@ use std::time::Instant;
 
 use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
 
+use super::promised_gain::LEAST_GAIN;
 use super::run::Run;
-use super::search::LEAST_GAIN;
 use super::stop::{Refusal, Stop};
 use crate::error::Error;
 use crate::nlopt::Sample;

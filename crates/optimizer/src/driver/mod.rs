@@ -130,7 +130,7 @@ fn advance(search: &mut Search<'_>, run: &mut Run<'_>) -> Result<Option<StopReas
         }
         NextStep::SearchOn => {}
         NextStep::Restore => search.restore(run),
-        NextStep::TightenTolerance => search.tighten_tolerance(run),
+        NextStep::TightenTolerance { promised } => search.tighten_tolerance(run, promised),
         NextStep::MoveTrustRegion => search.move_trust_region(run),
         NextStep::ShrinkTrustRegion { refused, gained } => search.shrink_trust_region(run, &refused, gained),
     }

@@ -13,6 +13,14 @@ const ACTIVE: f64 = 1e-3;
 /// Sweeps over the multipliers: few constraints hold a design at a time.
 const SWEEPS: usize = 50;
 
+/// Relative gain below which a search has gained nothing, where `ftol_rel` is finer.
+pub(super) const LEAST_GAIN: f64 = 1e-6;
+
+/// Multiple of the tolerance that the gradient may promise where a search that has gained nothing is believed. A method that begins
+/// anew knows no curvature, and its first steps gain little: quasi-Newton methods and SQP ended so where the objective was to fall to a
+/// third and to a seventh, and the gradient promised three to five thousand times the tolerance.
+pub(super) const BELIEVED_TOLERANCES: f64 = 100.0;
+
 /// The gain between the bounds, relative to the value of the sample.
 pub(super) fn promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
     let mut gradient = sample.gradient.clone();

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::near_miss::NearMiss;
-use super::promised_gain::promised_gain;
+use super::promised_gain::{BELIEVED_TOLERANCES, LEAST_GAIN, promised_gain};
 use super::stop::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason, Supervisor};
 use crate::error::Error;
@@ -279,9 +279,13 @@ impl<'a> Run<'a> {
         Some([self.promised?, self.promised_gain(&best.sample, &best.values)])
     }
 
-    /// Whether what is left of the initial objective is rounding.
-    pub(super) fn has_vanished(&self) -> bool {
-        self.best.as_ref().is_some_and(|best| best.sample.value.abs() < VANISHED)
+    /// What the gradient promises at the best design, where that is more than so many times the tolerance of the objective and more
+    /// than rounding, and neither the mesh nor a constraint is in the way.
+    pub(super) fn promised(&self, tolerances: f64) -> Option<f64> {
+        let has_vanished = self.best.as_ref().is_none_or(|best| best.sample.value.abs() < VANISHED);
+        let [_, now] =
+            self.promised_gains().filter(|_| !self.violates() && !self.is_held_back && !has_vanished)?;
+        (now > tolerances * LEAST_GAIN.max(self.settings.ftol_rel)).then_some(now)
     }
 
     /// Why a run ends whose mesh motion or field fails between two searches: what was reached is saved.
@@ -312,7 +316,7 @@ impl<'a> Run<'a> {
             return Err(Error::Replay { evaluation, cause });
         }
         let goes_on = stop_reason == StopReason::Superseded;
-        let warnings = if goes_on { Vec::new() } else { self.reservations() };
+        let warnings = if goes_on { Vec::new() } else { self.reservations(stop_reason) };
         warnings.iter().for_each(|warning| self.warn(warning));
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
             return Err(Error::Optimisation { cause: "it ended before the first evaluation" });
@@ -336,13 +340,22 @@ impl<'a> Run<'a> {
     }
 
     /// What is to be said at the end of the best design and its constraints.
-    fn reservations(&self) -> Vec<String> {
+    fn reservations(&self, stop_reason: StopReason) -> Vec<String> {
         let Some(best) = &self.best else { return Vec::new() };
         let violated = best.sample.constraints.iter().zip(self.problem.constraints());
         let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
         let names: Vec<String> =
             violated.map(|((excess, _), own)| format!("`{}` by {excess:.1e} of it", own.name)).collect();
         let mut warnings = Vec::new();
+        let promised = self.promised(BELIEVED_TOLERANCES);
+        if let Some(promised) = promised.filter(|_| stop_reason == StopReason::ObjectiveConverged) {
+            warnings.push(format!(
+                "the search came to its tolerance while the gradient still promises {:.0} % of the objective, if all designs within \
+                 the bounds had its slope: a run by another method, or one that begins with this design, shows how much of that is \
+                 to be had",
+                100.0 * promised
+            ));
+        }
         if best.violation > 0.0 {
             warnings.push(format!(
                 "no design keeps all constraints: the best one is beyond the bound of {}; loosen what is violated, widen the \

@@ -2,6 +2,7 @@
 //!
 //! [`Search::decide`] only looks; the other methods act, each in one way.
 
+use super::promised_gain::{BELIEVED_TOLERANCES, LEAST_GAIN};
 use super::run::Run;
 use super::stop::{Refusal, Stop};
 use super::trust_region::TrustRegion;
@@ -14,9 +15,6 @@ const SHRINK: f64 = 0.5;
 
 /// How often the trust region may shrink without a gain: to an eighth.
 const MAX_SHRINKS: usize = 3;
-
-/// Relative gain below which a search has gained nothing, where `ftol_rel` is finer.
-pub(super) const LEAST_GAIN: f64 = 1e-6;
 
 /// Factor on `ftol_rel` after the first search, and where a method ends after its first steps: it begins with a cautious
 /// step, whose small gain is no convergence.
@@ -34,11 +32,6 @@ const STILL_PROMISED: f64 = 0.1;
 /// for four evaluations in vain.
 const PROMISED_TOLERANCES: f64 = 10.0;
 
-/// Multiple of the tolerance that the gradient may promise where a search that has gained nothing is believed. A method that begins
-/// anew knows no curvature, and its first steps gain little: quasi-Newton methods and SQP ended so where the objective was to fall to a
-/// third and to a seventh, and the gradient promised three to five thousand times the tolerance.
-const BELIEVED_TOLERANCES: f64 = 100.0;
-
 /// How often an end after the cautious first step, or with much promised, is not believed.
 const MAX_TIGHTENINGS: usize = 3;
 
@@ -53,7 +46,10 @@ pub(super) struct Ended {
 /// What follows from a search.
 pub(super) enum NextStep {
     Stop(StopReason),
-    TightenTolerance,
+    /// What the gradient promises, where that is why.
+    TightenTolerance {
+        promised: Option<f64>,
+    },
     /// From the best design, where the mesh leaves little room, the search has come from outside the constraints, or the gradient
     /// still promises much.
     SearchOn,
@@ -117,7 +113,7 @@ impl<'a> Search<'a> {
         });
         let evaluations = run.evaluations() - before.0;
         if let Outcome::Interrupted(Stop::Mesh(refusal)) = &outcome {
-            self.ftol_rel = RESTART_TOLERANCE * self.settings.ftol_rel;
+            self.ftol_rel = self.ftol_rel.min(RESTART_TOLERANCE * self.settings.ftol_rel);
             self.refused = Some(refusal.clone());
         }
         let gained = run.has_gained(before, LEAST_GAIN.max(self.settings.ftol_rel));
@@ -165,52 +161,26 @@ impl<'a> Search<'a> {
         let is_stuck = run.is_held_back && evaluations == 0;
         let may_tighten = self.ftol_rel > 0.0 && self.tightenings < MAX_TIGHTENINGS && !is_stuck;
         if ending == Ending::Objective && evaluations <= CAUTIOUS && may_tighten {
-            return NextStep::TightenTolerance;
+            return NextStep::TightenTolerance { promised: None };
         }
+        // In a small trust region much is promised that is out of reach.
+        let is_free = may_tighten && self.ftol_rel > LEAST_GAIN && self.trust.scale == 1.0;
+        let promised = run.promised(PROMISED_TOLERANCES).filter(|_| ending == Ending::Objective);
+        let unbelieved = run.promised(BELIEVED_TOLERANCES).filter(|_| ending == Ending::Objective && is_free);
         let held_back = self.trust.holds_back(run.shape(), &run.centre());
         match &self.refused {
             _ if held_back && gained => NextStep::MoveTrustRegion,
-            _ if ending == Ending::Objective
-                && gained
-                && self.promised(run, PROMISED_TOLERANCES).is_some() =>
-            {
-                NextStep::SearchOn
-            }
-            _ if ending == Ending::Objective
-                && may_tighten
-                && self.promised(run, BELIEVED_TOLERANCES).is_some() =>
-            {
-                NextStep::TightenTolerance
-            }
+            _ if gained && promised.is_some() => NextStep::SearchOn,
+            _ if unbelieved.is_some() => NextStep::TightenTolerance { promised: unbelieved },
             Some(refusal) if held_back && self.trust.scale < 1.0 => {
                 self.after_refusal(run, refusal.clone(), gained)
             }
             _ => NextStep::Stop(match ending {
                 Ending::Roundoff => StopReason::RoundoffLimited,
                 _ if run.is_held_back || self.is_throttled(run) => StopReason::MeshLimited,
-                Ending::Objective | Ending::Entered => {
-                    self.warn_of_promise(run);
-                    StopReason::ObjectiveConverged
-                }
+                Ending::Objective | Ending::Entered => StopReason::ObjectiveConverged,
                 Ending::Step => StopReason::StepConverged,
             }),
-        }
-    }
-
-    /// What the gradient promises where that is more than so many times the tolerance by which the method has ended.
-    fn promised(&self, run: &Run<'_>, tolerances: f64) -> Option<f64> {
-        let [_, now] = run.promised_gains().filter(|_| !run.violates() && !run.is_held_back)?;
-        (now > tolerances * self.settings.ftol_rel && !run.has_vanished()).then_some(now)
-    }
-
-    /// Says what the gradient still promises where a search is believed all the same.
-    fn warn_of_promise(&self, run: &mut Run<'_>) {
-        let promised = self.promised(run, BELIEVED_TOLERANCES).filter(|_| self.ftol_rel > 0.0);
-        if let Some(promised) = promised {
-            run.warn(&format!(
-                "the search came to its tolerance while the gradient still promises {:.0} % of the objective, if the whole range of the                  design had the slope of this one: another method, or a run that begins with this design, tells whether that is to be had",
-                100.0 * promised
-            ));
         }
     }
 
@@ -247,11 +217,11 @@ impl<'a> Search<'a> {
     }
 
     /// Continues with a tighter tolerance after a cautious first step, or where the gradient promises much.
-    pub(super) fn tighten_tolerance(&mut self, run: &mut Run<'_>) {
+    pub(super) fn tighten_tolerance(&mut self, run: &mut Run<'_>, promised: Option<f64>) {
         self.tightenings += 1;
         self.ftol_rel *= RESTART_TOLERANCE;
         let plan = format!(": the search goes on with a relative tolerance of {:.0e}", self.ftol_rel);
-        let what = match self.promised(run, BELIEVED_TOLERANCES) {
+        let what = match promised {
             Some(promised) => {
                 format!("the gradient still promises {:.0} % of the objective", 100.0 * promised)
             }

@@ -8,12 +8,20 @@
 //! Does not live here: the linear potential itself, which is in [`super::solid`], and the current, which is that of it alone.
 
 use fluxmorph_geometry::fem::{
-    BlockPattern, Cholesky, CholeskyAnalysis, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix,
+    BlockPattern, Coupling, CsrMatrix, DofMap, ElementGroup, IterationStatus, LocalMatrix,
+    conjugate_gradients,
 };
 use fluxmorph_geometry::tet4::{EDGES, Point, Tet4, add, dot};
-use fluxmorph_geometry::{CarrierId, ElementId, Mesh, MeshError, NodeId};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use super::region::TerminalFace;
+use crate::error::{NonConvergence, SolverError};
+
+/// Relative residual to which the correction is found: its energy is exact to the square of that.
+const TOLERANCE: f64 = 1e-8;
+
+/// Most iterations: conductors a thousand elements long take some thousands.
+const MOST_ITERATIONS: usize = 50_000;
 
 /// Functions of an element: four of vertices and six of edges.
 const FUNCTIONS: usize = 10;
@@ -124,13 +132,13 @@ fn ends_of(tet: [NodeId; 4], ends: [usize; 2]) -> [NodeId; 2] {
 /// its segment.
 ///
 /// # Errors
-/// [`MeshError::Factorisation`] where the matrix is not positive definite.
+/// [`SolverError::NotConverged`] where the correction is not found.
 pub(super) fn decrease(
     mesh: &Mesh,
     potential: &[(ElementId, [f64; 4])],
     segments: &[usize],
     terminals: &[TerminalFace],
-) -> Result<Vec<f64>, MeshError> {
+) -> Result<Vec<f64>, SolverError> {
     let carriers = Carriers::of(mesh, potential);
     let connectivity: Vec<_> =
         potential.iter().map(|(e, _)| carriers.of_tet(mesh.topology().tet(*e))).collect();
@@ -150,15 +158,19 @@ pub(super) fn decrease(
             std::array::from_fn(|function| own.against(function, gradient))
         })
         .collect();
-    let mut correction = vec![0.0; dofs.count()];
+    let mut load_of_all = vec![0.0; dofs.count()];
     for (carriers, load) in connectivity.iter().zip(&loads) {
         for (carrier, load) in carriers.iter().zip(load) {
-            dofs.scatter_add(&mut correction, *carrier, [*load]);
+            dofs.scatter_add(&mut load_of_all, *carrier, [*load]);
         }
     }
-    if dofs.count() > 0 {
-        let factor = Cholesky::new(&CholeskyAnalysis::new(pattern.structure())?, &matrix)?;
-        factor.solve_in_place(&mut correction);
+    let diagonal: Vec<f64> = (0..dofs.count()).map(|row| matrix.entry(row, row).unwrap_or(1.0)).collect();
+    let scaled = |r: &[f64], z: &mut [f64]| (0..r.len()).for_each(|row| z[row] = r[row] / diagonal[row]);
+    let (correction, report) = conjugate_gradients(&matrix, scaled, &load_of_all, TOLERANCE, MOST_ITERATIONS);
+    if report.status == IterationStatus::Stopped {
+        let (residual, iterations) = (report.residual, report.iterations);
+        let cause = NonConvergence::IllConditioned;
+        return Err(SolverError::NotConverged { residual, required: TOLERANCE, iterations, cause });
     }
     let mut taken = vec![0.0; segments.iter().max().map_or(0, |last| last + 1)];
     for ((carriers, load), segment) in connectivity.iter().zip(&loads).zip(segments) {

@@ -33,6 +33,16 @@ pub enum Connection {
     Parallel,
 }
 
+/// What is found once and shared by clones; no part of what a conductor is.
+#[derive(Clone, Debug, Default)]
+struct Known(Arc<OnceLock<Vec<f64>>>);
+
+impl PartialEq for Known {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
 /// The way of the current through a conductor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolidConductor {
@@ -43,7 +53,7 @@ pub struct SolidConductor {
     /// `g` of every segment.
     conductances: Vec<f64>,
     /// The same to second order, once it was asked for.
-    of_second_order: Arc<OnceLock<Vec<f64>>>,
+    of_second_order: Known,
 }
 
 impl SolidConductor {
@@ -120,7 +130,7 @@ impl SolidConductor {
         let current = gradient.into_iter().zip(&segments).map(scaled).collect();
         let direct = RegionCurrent::of_conduction((patch, problem), current, terminals, sections);
         let potential = patch.elements.iter().copied().zip(chi).collect();
-        Self { potential, segments, direct, conductances, of_second_order: Arc::default() }
+        Self { potential, segments, direct, conductances, of_second_order: Known::default() }
     }
 
     /// The number of every element's segment, in the order of [`SolidConductor::potential`]: segments are in series, each with a
@@ -164,13 +174,13 @@ impl SolidConductor {
 
     /// `g` of every segment to second order.
     fn second_order(&self, mesh: &Mesh) -> Result<&Vec<f64>, SolverError> {
-        if let Some(known) = self.of_second_order.get() {
+        if let Some(known) = self.of_second_order.0.get() {
             return Ok(known);
         }
         let taken = conduction::decrease(mesh, &self.potential, &self.segments, self.direct.terminals())?;
         let of = |(g, taken): (&f64, f64)| g - taken;
         let conductances = self.conductances.iter().zip(taken).map(of).collect();
-        Ok(self.of_second_order.get_or_init(|| conductances))
+        Ok(self.of_second_order.0.get_or_init(|| conductances))
     }
 }
 

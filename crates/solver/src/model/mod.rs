@@ -261,11 +261,6 @@ impl FieldModel {
         self.all_sources().find_map(|sources| sources.torn_element(self.topology(), &moves))
     }
 
-    /// Whether an element is in the window of a coil, and no winding meets it.
-    pub fn is_in_window(&self, element: ElementId) -> bool {
-        self.all_sources().any(|sources| sources.is_in_window(element))
-    }
-
     fn all_sources(&self) -> impl Iterator<Item = &Sources> {
         std::iter::once(&*self.sources).chain(self.windings().sources())
     }
