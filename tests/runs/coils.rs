@@ -319,8 +319,7 @@ fn the_resistance_of_a_bend_has_an_error_bar_and_so_has_the_current_at_a_voltage
     let path = home.path().join("bend.toml");
     std::fs::write(&path, BEND).expect("written");
     let out = home.path().join("out");
-    let said = fluxmorph(&[&"solve", &path, &"--out", &out]).completed().stdout;
-    assert!(said.contains(" ohm (estimated)") && said.contains(" A (estimated)"), "{said}");
+    fluxmorph(&[&"solve", &path, &"--out", &out]).completed().says(&[" ohm (estimated)", " A (estimated)"]);
     let found = read_json(&out.join("result.json"));
     // In the corner there are 1 - (2/pi) ln 2 squares.
     let resistance = (5.0 - 2.0 / std::f64::consts::PI * 2.0_f64.ln()) / (58e6 * 5e-3);
