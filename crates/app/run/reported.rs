@@ -23,6 +23,11 @@ use crate::files::{ForceError, StateErrors};
 /// Differences that are rounding, as a share of the value.
 const ROUNDING: f64 = 1e-9;
 
+/// Whether a difference is more than rounding of a value, or no number.
+fn is_changed(difference: f64, value: f64) -> bool {
+    difference.is_nan() || difference > ROUNDING * value
+}
+
 /// Whether the states of a problem report anything beside the objective.
 pub(super) fn is_something(config: &Config, problem: &Problem) -> bool {
     let has_losses = |model: &FieldModel| {
@@ -204,14 +209,14 @@ impl Reported {
                 .currents
                 .iter()
                 .zip(&better.currents)
-                .filter(|((_, own), (_, more))| !((more - own).norm() <= ROUNDING * own.norm()))
+                .filter(|((_, own), (_, more))| is_changed((more - own).norm(), own.norm()))
                 .map(amplitude)
                 .collect(),
             resistances_ohm: self
                 .resistances
                 .iter()
                 .zip(&better.resistances)
-                .filter(|((_, own), (_, more))| !((more - own).abs() <= ROUNDING * own))
+                .filter(|((_, own), (_, more))| is_changed((more - own).abs(), own.abs()))
                 .map(number)
                 .collect(),
             flux_linkages_wb: self.flux_linkages.iter().zip(&better.flux_linkages).map(amplitude).collect(),

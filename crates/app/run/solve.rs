@@ -122,7 +122,6 @@ impl Session<'_> {
         let optimum = if halvings > 0 { directory.optimum_refined() } else { directory.optimum() };
         exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
-        let (reason, timings) = (StopReason::Done, &analysis.timings);
         let left_out = LeftOut::of(problem, analysis);
         let at_initial = Some(&left_out).filter(|_| has_initial_bounds);
         let broken = left_out.broken_bounds(problem, (analysis, &bounds), at_initial);
@@ -144,7 +143,7 @@ impl Session<'_> {
             }),
             accuracy,
             constraints,
-            ..self.result(reason, analysis, None, initial_quality, timings, observer)?
+            ..self.result(StopReason::Done, analysis, None, initial_quality, &analysis.timings, observer)?
         };
         result.warnings.extend(broken);
         if let Some(estimate) = estimate {
