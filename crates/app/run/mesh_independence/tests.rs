@@ -191,7 +191,8 @@ fn constraints_are_measured_anew_and_a_violated_one_is_a_warning() {
     assert!((constraints[0].bound - 2.88e-4).abs() < 1e-12, "{constraints:?}");
     assert!((constraints[0].value - 1.1 * 2.88e-4).abs() < 1e-12 && !constraints[0].satisfied);
     assert!(
-        recorded.warnings.len() == 1 && recorded.warnings[0].contains("`volume_plate`: +10.00 %"),
+        recorded.warnings.len() == 1
+            && recorded.warnings[0].contains("`volume_plate`: 10.00 % above its bound"),
         "{:?}",
         recorded.warnings
     );

@@ -24,16 +24,48 @@ pub(super) const BELIEVED_TOLERANCES: f64 = 100.0;
 /// The gain between the bounds, relative to the value of the sample.
 pub(super) fn promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
     let mut gradient = sample.gradient.clone();
-    // The worst case may fall only as far as the other terms stay below it.
-    let difference = |of: &[f64]| of.iter().zip(&sample.gradient).map(|(own, worst)| own - worst).collect();
-    let others = sample.members.iter().map(|(value, of)| (value - sample.value, difference(of)));
-    let holding: Vec<(f64, Vec<f64>)> = sample.constraints.iter().cloned().chain(others).collect();
-    remove_held(&mut gradient, &holding);
+    remove_held(&mut gradient, &holding(sample));
     let gain = |k: usize| {
         let room = if gradient[k] > 0.0 { design[k] - lower[k] } else { upper[k] - design[k] };
         gradient[k].abs() * room.max(0.0)
     };
     (0..design.len()).map(gain).sum::<f64>() / sample.value.abs().max(f64::MIN_POSITIVE)
+}
+
+/// The same by the multipliers that leave the least of several: each leaves a bound on what the linear problem has, and these look at
+/// the variables alone that have room against the gradient. At an optimum that constraints and bounds hold together it is zero, where
+/// [`promised_gain`] is not.
+pub(super) fn least_promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
+    let room = |k: usize, slope: f64| {
+        if slope > 0.0 { (design[k] - lower[k]).max(0.0) } else { (upper[k] - design[k]).max(0.0) }
+    };
+    let gain =
+        |gradient: &[f64]| gradient.iter().enumerate().map(|(k, g)| g.abs() * room(k, *g)).sum::<f64>();
+    let mut gradient = sample.gradient.clone();
+    let mut held = holding(sample);
+    held.retain(|(value, _)| *value > -ACTIVE);
+    let mut multipliers = vec![0.0_f64; held.len()];
+    let mut least = gain(&gradient);
+    for _ in 0..SWEEPS {
+        for ((_, of), multiplier) in held.iter().zip(&mut multipliers) {
+            let movable: Vec<usize> = (0..of.len()).filter(|&k| room(k, gradient[k]) > 0.0).collect();
+            let along: f64 = movable.iter().map(|&k| gradient[k] * of[k]).sum();
+            let square: f64 = movable.iter().map(|&k| of[k] * of[k]).sum();
+            let next = if square > 0.0 { (*multiplier - along / square).max(0.0) } else { *multiplier };
+            let step = next - *multiplier;
+            gradient.iter_mut().zip(of).for_each(|(g, c)| *g += step * c);
+            *multiplier = next;
+        }
+        least = least.min(gain(&gradient));
+    }
+    least / sample.value.abs().max(f64::MIN_POSITIVE)
+}
+
+/// What may hold a design: its constraints, and, as a worst case may fall only as far as the other terms stay below it, these.
+fn holding(sample: &Sample) -> Vec<(f64, Vec<f64>)> {
+    let difference = |of: &[f64]| of.iter().zip(&sample.gradient).map(|(own, worst)| own - worst).collect();
+    let others = sample.members.iter().map(|(value, of)| (value - sample.value, difference(of)));
+    sample.constraints.iter().cloned().chain(others).collect()
 }
 
 /// Adds to a gradient what the constraints that are active hold of it: `g + Σ μ ∇c` of least norm, `μ ≥ 0`.
@@ -85,6 +117,11 @@ mod tests {
         assert!(gain(&kink, [0.0, 0.0]) < 1e-9);
         kink.members[1].0 = -0.6;
         assert!(gain(&kink, [0.0, 0.0]) > 0.5);
+        // A bound and a constraint that hold it together, by another multiplier than that of least norm over both variables.
+        let both = sample(&[-0.1, -0.9], &[(0.0, vec![1.0, 2.0])]);
+        let least = |design: [f64; 2]| least_promised_gain(&both, &design, &lower, &upper);
+        assert!(gain(&both, [0.0, 1.0]) > 0.5 && least([0.0, 1.0]) < 1e-9);
+        assert!(least([0.0, 0.5]) > 0.1, "the second has room");
         // Two that hold it together.
         let two = [(0.0, vec![1.0, 0.0]), (0.0, vec![1.0, 1.0])];
         assert!(gain(&sample(&[-0.3, -0.2], &two), [0.0, 0.0]) < 1e-9);

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::near_miss::NearMiss;
-use super::promised_gain::{BELIEVED_TOLERANCES, LEAST_GAIN, promised_gain};
+use super::promised_gain::{BELIEVED_TOLERANCES, LEAST_GAIN, least_promised_gain, promised_gain};
 use super::stop::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason, Supervisor};
 use crate::error::Error;
@@ -279,6 +279,14 @@ impl<'a> Run<'a> {
         Some([self.promised?, self.promised_gain(&best.sample, &best.values)])
     }
 
+    /// What the gradient promises at the best design at least, where a search that has gained nothing is not to be believed for it.
+    pub(super) fn surely_promised(&self) -> Option<f64> {
+        self.promised(BELIEVED_TOLERANCES)?;
+        let (best, shape) = (self.best.as_ref()?, self.shape());
+        let least = least_promised_gain(&best.sample, &best.values, shape.lower(), shape.upper());
+        (least > BELIEVED_TOLERANCES * LEAST_GAIN.max(self.settings.ftol_rel)).then_some(least)
+    }
+
     /// What the gradient promises at the best design, where that is more than so many times the tolerance of the objective and more
     /// than rounding, and neither the mesh nor a constraint is in the way.
     pub(super) fn promised(&self, tolerances: f64) -> Option<f64> {
@@ -347,7 +355,7 @@ impl<'a> Run<'a> {
         let names: Vec<String> =
             violated.map(|((excess, _), own)| format!("`{}` by {excess:.1e} of it", own.name)).collect();
         let mut warnings = Vec::new();
-        let promised = self.promised(BELIEVED_TOLERANCES);
+        let promised = self.surely_promised();
         if let Some(promised) = promised.filter(|_| stop_reason == StopReason::ObjectiveConverged) {
             warnings.push(format!(
                 "the search came to its tolerance while the gradient still promises {:.0} % of the objective, if all designs within \

@@ -2,7 +2,7 @@
 //!
 //! [`Search::decide`] only looks; the other methods act, each in one way.
 
-use super::promised_gain::{BELIEVED_TOLERANCES, LEAST_GAIN};
+use super::promised_gain::LEAST_GAIN;
 use super::run::Run;
 use super::stop::{Refusal, Stop};
 use super::trust_region::TrustRegion;
@@ -166,7 +166,7 @@ impl<'a> Search<'a> {
         // In a small trust region much is promised that is out of reach.
         let is_free = may_tighten && self.ftol_rel > LEAST_GAIN && self.trust.scale == 1.0;
         let promised = run.promised(PROMISED_TOLERANCES).filter(|_| ending == Ending::Objective);
-        let unbelieved = run.promised(BELIEVED_TOLERANCES).filter(|_| ending == Ending::Objective && is_free);
+        let unbelieved = run.surely_promised().filter(|_| ending == Ending::Objective && is_free);
         let held_back = self.trust.holds_back(run.shape(), &run.centre());
         match &self.refused {
             _ if held_back && gained => NextStep::MoveTrustRegion,
