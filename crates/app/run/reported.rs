@@ -99,6 +99,12 @@ pub(super) fn expansions(
 /// A name, the size of its value, and the error of that.
 type Entry = (String, f64, f64);
 
+/// Values by names with their sizes, and their errors by the same.
+fn entries<T>(own: &[(String, T)], size: impl Fn(&T) -> f64, errors: &BTreeMap<String, f64>) -> Vec<Entry> {
+    let error = |name: &String| errors.get(name).copied().unwrap_or_default();
+    own.iter().map(|(name, own)| (name.clone(), size(own), error(name))).collect()
+}
+
 /// Errors relative to the largest value.
 fn shares_of(kind: &str, entries: Vec<Entry>) -> Vec<(String, f64)> {
     let largest = entries.iter().map(|(_, value, _)| *value).fold(0.0, f64::max);
@@ -135,29 +141,29 @@ impl Reported {
     /// Errors of losses, currents, resistances, flux linkages, forces, expansions and the field at probes, relative to the largest of
     /// their kind, with their names: as many for whatever errors, in one order; zero where there is none, NaN of a point outside.
     pub(super) fn shares(&self, errors: &StateErrors) -> Vec<(String, f64)> {
-        let of =
-            |errors: &BTreeMap<String, f64>, name: &String| errors.get(name).copied().unwrap_or_default();
-        let amplitudes = |own: &[(String, c64)], errors: &BTreeMap<String, f64>| -> Vec<Entry> {
-            own.iter().map(|(name, own)| (name.clone(), own.norm(), of(errors, name))).collect()
-        };
-        let numbers = |own: &[(String, f64)], errors: &BTreeMap<String, f64>| -> Vec<Entry> {
-            own.iter().map(|(name, own)| (name.clone(), own.abs(), of(errors, name))).collect()
-        };
         let force = |own: &BodyForce| {
             let error = errors.forces.get(&own.name).map_or(0.0, |error| error.force_n);
             (own.name.clone(), norm(own.force_n), error)
         };
         let mut all = [
-            shares_of("the loss in", numbers(&self.losses, &errors.losses_w)),
-            shares_of("the current of", amplitudes(&self.currents, &errors.currents_a)),
-            shares_of("the resistance of", numbers(&self.resistances, &errors.resistances_ohm)),
-            shares_of("the flux linkage of", amplitudes(&self.flux_linkages, &errors.flux_linkages_wb)),
+            shares_of("the loss in", entries(&self.losses, |own| own.abs(), &errors.losses_w)),
+            shares_of("the current of", entries(&self.currents, |own| own.norm(), &errors.currents_a)),
+            shares_of(
+                "the resistance of",
+                entries(&self.resistances, |own| own.abs(), &errors.resistances_ohm),
+            ),
+            shares_of(
+                "the flux linkage of",
+                entries(&self.flux_linkages, |own| own.norm(), &errors.flux_linkages_wb),
+            ),
             shares_of("the force on", self.forces.iter().map(force).collect()),
         ]
         .concat();
         for (set, terms) in &self.expansions {
             let own = errors.multipoles_t.get(set);
-            let error = |term: &Harmonic| own.map_or(0.0, |errors| of(errors, &term.to_string()));
+            let error = |term: &Harmonic| {
+                own.and_then(|errors| errors.get(&term.to_string())).copied().unwrap_or_default()
+            };
             let terms = terms.iter().map(|(term, value)| (set.clone(), value.norm(), error(term)));
             all.extend(shares_of("a term of", terms.collect()));
         }

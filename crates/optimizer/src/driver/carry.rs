@@ -14,7 +14,6 @@ use std::time::Instant;
 
 use fluxmorph_remesh::{Carried, LEAST_ROOM, Moved};
 
-use super::promised_gain::LEAST_GAIN;
 use super::run::Run;
 use super::stop::{Refusal, Stop};
 use crate::error::Error;
@@ -110,7 +109,7 @@ impl Run<'_> {
             self.is_held_back = carried.is_held_back();
         }
         // With less, a search creeps along the boundary in ever smaller steps.
-        let least = LEAST_GAIN.max(self.settings.ftol_rel);
+        let least = self.settings.least_gain();
         let has_gained = before.best.is_none() || self.has_gained(before.values, least);
         if let Some(cut) = &carried.cut {
             let cause = format!("the mesh carries a part of the step: {cut}");

@@ -13,77 +13,89 @@ const ACTIVE: f64 = 1e-3;
 /// Sweeps over the multipliers: few constraints hold a design at a time.
 const SWEEPS: usize = 50;
 
-/// Relative gain below which a search has gained nothing, where `ftol_rel` is finer.
-pub(super) const LEAST_GAIN: f64 = 1e-6;
-
 /// Multiple of the tolerance that the gradient may promise where a search that has gained nothing is believed. A method that begins
 /// anew knows no curvature, and its first steps gain little: quasi-Newton methods and SQP ended so where the objective was to fall to a
 /// third and to a seventh, and the gradient promised three to five thousand times the tolerance.
 pub(super) const BELIEVED_TOLERANCES: f64 = 100.0;
 
-/// The gain between the bounds, relative to the value of the sample.
+/// The gain between the bounds, relative to the value of the sample, by the multipliers of least norm.
 pub(super) fn promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
-    let mut gradient = sample.gradient.clone();
-    remove_held(&mut gradient, &holding(sample));
-    let gain = |k: usize| {
-        let room = if gradient[k] > 0.0 { design[k] - lower[k] } else { upper[k] - design[k] };
-        gradient[k].abs() * room.max(0.0)
-    };
-    (0..design.len()).map(gain).sum::<f64>() / sample.value.abs().max(f64::MIN_POSITIVE)
+    let room = Room { design, lower, upper };
+    let mut reduced = Reduced::of(sample);
+    (0..SWEEPS).for_each(|_| reduced.sweep(|_, _| true));
+    room.gain(&reduced.gradient) / size(sample)
 }
 
 /// The same by the multipliers that leave the least of several: each leaves a bound on what the linear problem has, and these look at
 /// the variables alone that have room against the gradient. At an optimum that constraints and bounds hold together it is zero, where
 /// [`promised_gain`] is not.
 pub(super) fn least_promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
-    let room = |k: usize, slope: f64| {
-        if slope > 0.0 { (design[k] - lower[k]).max(0.0) } else { (upper[k] - design[k]).max(0.0) }
-    };
-    let gain =
-        |gradient: &[f64]| gradient.iter().enumerate().map(|(k, g)| g.abs() * room(k, *g)).sum::<f64>();
-    let mut gradient = sample.gradient.clone();
-    let mut held = holding(sample);
-    held.retain(|(value, _)| *value > -ACTIVE);
-    let mut multipliers = vec![0.0_f64; held.len()];
-    let mut least = gain(&gradient);
+    let room = Room { design, lower, upper };
+    let mut reduced = Reduced::of(sample);
+    let mut least = room.gain(&reduced.gradient);
     for _ in 0..SWEEPS {
-        for ((_, of), multiplier) in held.iter().zip(&mut multipliers) {
-            let movable: Vec<usize> = (0..of.len()).filter(|&k| room(k, gradient[k]) > 0.0).collect();
-            let along: f64 = movable.iter().map(|&k| gradient[k] * of[k]).sum();
-            let square: f64 = movable.iter().map(|&k| of[k] * of[k]).sum();
-            let next = if square > 0.0 { (*multiplier - along / square).max(0.0) } else { *multiplier };
-            let step = next - *multiplier;
-            gradient.iter_mut().zip(of).for_each(|(g, c)| *g += step * c);
-            *multiplier = next;
-        }
-        least = least.min(gain(&gradient));
+        reduced.sweep(|k, slope| room.against(k, slope) > 0.0);
+        least = least.min(room.gain(&reduced.gradient));
     }
-    least / sample.value.abs().max(f64::MIN_POSITIVE)
+    least / size(sample)
 }
 
-/// What may hold a design: its constraints, and, as a worst case may fall only as far as the other terms stay below it, these.
-fn holding(sample: &Sample) -> Vec<(f64, Vec<f64>)> {
-    let difference = |of: &[f64]| of.iter().zip(&sample.gradient).map(|(own, worst)| own - worst).collect();
-    let others = sample.members.iter().map(|(value, of)| (value - sample.value, difference(of)));
-    sample.constraints.iter().cloned().chain(others).collect()
+fn size(sample: &Sample) -> f64 {
+    sample.value.abs().max(f64::MIN_POSITIVE)
 }
 
-/// Adds to a gradient what the constraints that are active hold of it: `g + Σ μ ∇c` of least norm, `μ ≥ 0`.
-fn remove_held(gradient: &mut [f64], constraints: &[(f64, Vec<f64>)]) {
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let active: Vec<(&[f64], f64)> = constraints
-        .iter()
-        .filter(|(value, _)| *value > -ACTIVE)
-        .map(|(_, of)| (of.as_slice(), product(of, of)))
-        .filter(|(_, square)| *square > 0.0)
-        .collect();
-    let mut multipliers = vec![0.0; active.len()];
-    for _ in 0..SWEEPS {
-        for ((of, square), multiplier) in active.iter().zip(&mut multipliers) {
-            let next = (*multiplier - product(gradient, of) / square).max(0.0);
-            let step = next - *multiplier;
-            gradient.iter_mut().zip(*of).for_each(|(g, c)| *g += step * c);
-            *multiplier = next;
+/// How far the variables of a design may go.
+struct Room<'a> {
+    design: &'a [f64],
+    lower: &'a [f64],
+    upper: &'a [f64],
+}
+
+impl Room<'_> {
+    /// Of a variable against its derivative.
+    fn against(&self, k: usize, slope: f64) -> f64 {
+        let room = if slope > 0.0 { self.design[k] - self.lower[k] } else { self.upper[k] - self.design[k] };
+        room.max(0.0)
+    }
+
+    /// What a gradient promises of all.
+    fn gain(&self, gradient: &[f64]) -> f64 {
+        gradient.iter().enumerate().map(|(k, slope)| slope.abs() * self.against(k, *slope)).sum()
+    }
+}
+
+/// What the constraints that are active leave of a gradient: `g + Σ μ ∇c`, `μ ≥ 0`.
+struct Reduced {
+    gradient: Vec<f64>,
+    /// Gradients of the active ones, with their multipliers.
+    held: Vec<(Vec<f64>, f64)>,
+}
+
+impl Reduced {
+    /// With multipliers of zero.
+    fn of(sample: &Sample) -> Self {
+        let gradient = sample.gradient.clone();
+        // The worst case may fall only as far as the other terms stay below it.
+        let difference = |of: &[f64]| of.iter().zip(&gradient).map(|(own, worst)| own - worst).collect();
+        let others = sample.members.iter().map(|(value, of)| (value - sample.value, difference(of)));
+        let holding = sample.constraints.iter().cloned().chain(others);
+        let held = holding.filter(|(value, _)| *value > -ACTIVE).map(|(_, of)| (of, 0.0)).collect();
+        Self { gradient, held }
+    }
+
+    /// One multiplier after the other for the least norm over the variables that have a say, by number and derivative.
+    fn sweep(&mut self, has_say: impl Fn(usize, f64) -> bool) {
+        let Self { gradient, held } = self;
+        for (of, multiplier) in held {
+            let counted = || gradient.iter().zip(&*of).enumerate().filter(|(k, (g, _))| has_say(*k, **g));
+            let along: f64 = counted().map(|(_, (g, c))| g * c).sum();
+            let square: f64 = counted().map(|(_, (_, c))| c * c).sum();
+            if square > 0.0 {
+                let next = (*multiplier - along / square).max(0.0);
+                let step = next - *multiplier;
+                gradient.iter_mut().zip(&*of).for_each(|(g, c)| *g += step * c);
+                *multiplier = next;
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::near_miss::NearMiss;
-use super::promised_gain::{BELIEVED_TOLERANCES, LEAST_GAIN, least_promised_gain, promised_gain};
+use super::promised_gain::{BELIEVED_TOLERANCES, least_promised_gain, promised_gain};
 use super::stop::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason, Supervisor};
 use crate::error::Error;
@@ -284,7 +284,7 @@ impl<'a> Run<'a> {
         self.promised(BELIEVED_TOLERANCES)?;
         let (best, shape) = (self.best.as_ref()?, self.shape());
         let least = least_promised_gain(&best.sample, &best.values, shape.lower(), shape.upper());
-        (least > BELIEVED_TOLERANCES * LEAST_GAIN.max(self.settings.ftol_rel)).then_some(least)
+        (least > BELIEVED_TOLERANCES * self.settings.least_gain()).then_some(least)
     }
 
     /// What the gradient promises at the best design, where that is more than so many times the tolerance of the objective and more
@@ -293,7 +293,7 @@ impl<'a> Run<'a> {
         let has_vanished = self.best.as_ref().is_none_or(|best| best.sample.value.abs() < VANISHED);
         let [_, now] =
             self.promised_gains().filter(|_| !self.violates() && !self.is_held_back && !has_vanished)?;
-        (now > tolerances * LEAST_GAIN.max(self.settings.ftol_rel)).then_some(now)
+        (now > tolerances * self.settings.least_gain()).then_some(now)
     }
 
     /// Why a run ends whose mesh motion or field fails between two searches: what was reached is saved.

@@ -2,8 +2,8 @@
 //!
 //! [`Search::decide`] only looks; the other methods act, each in one way.
 
-use super::promised_gain::LEAST_GAIN;
 use super::run::Run;
+use super::settings::LEAST_GAIN;
 use super::stop::{Refusal, Stop};
 use super::trust_region::TrustRegion;
 use super::{Settings, StopReason};
@@ -116,7 +116,7 @@ impl<'a> Search<'a> {
             self.ftol_rel = self.ftol_rel.min(RESTART_TOLERANCE * self.settings.ftol_rel);
             self.refused = Some(refusal.clone());
         }
-        let gained = run.has_gained(before, LEAST_GAIN.max(self.settings.ftol_rel));
+        let gained = run.has_gained(before, self.settings.least_gain());
         Ended { outcome, gained, evaluations }
     }
 

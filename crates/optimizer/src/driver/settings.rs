@@ -2,6 +2,9 @@
 
 use crate::nlopt::Algorithm;
 
+/// Relative gain below which a search has gained nothing, where `ftol_rel` is finer.
+pub(super) const LEAST_GAIN: f64 = 1e-6;
+
 /// Method and limits of an optimisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
@@ -31,4 +34,9 @@ impl Settings {
         xtol_rel: 0.0,
         first_step: 0.1,
     };
+
+    /// Relative gain below which a search has gained nothing.
+    pub(super) fn least_gain(&self) -> f64 {
+        LEAST_GAIN.max(self.ftol_rel)
+    }
 }

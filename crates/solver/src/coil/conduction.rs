@@ -12,6 +12,7 @@ use fluxmorph_geometry::fem::{
     conjugate_gradients,
 };
 use fluxmorph_geometry::tet4::{EDGES, Point, Tet4, add, dot};
+use fluxmorph_geometry::topology::{edge_key, triangle_edges};
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use super::region::TerminalFace;
@@ -108,11 +109,10 @@ impl Carriers {
         let mut given = vec![false; self.count()];
         given[0] = terminals.is_empty();
         for face in terminals {
-            let [a, b, c] = face.nodes;
             for node in face.nodes {
                 self.nodes.binary_search(&node).into_iter().for_each(|place| given[place] = true);
             }
-            for ends in [[a, b], [a, c], [b, c]] {
+            for ends in triangle_edges(face.nodes) {
                 let place = self.edges.binary_search(&ends);
                 place.into_iter().for_each(|edge| given[self.nodes.len() + edge] = true);
             }
@@ -121,11 +121,9 @@ impl Carriers {
     }
 }
 
-/// The ends of an edge, ascending.
+/// The ends of an edge of an element, as a key.
 fn ends_of(tet: [NodeId; 4], ends: [usize; 2]) -> [NodeId; 2] {
-    let mut ends = ends.map(|place| tet[place]);
-    ends.sort_unstable();
-    ends
+    edge_key(ends.map(|place| tet[place]))
 }
 
 /// What second order takes off `∫|∇χ|²` [m] of every segment; `potential` is χ at the vertices of every element, of which each has
