@@ -9,7 +9,7 @@ use fluxmorph_optimizer::Error;
 use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, StopReason, optimise};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 
-use crate::problems::{Rows, analysed, initial, objective, optimised};
+use crate::problems::{Notes, Rows, analysed, initial, objective, optimised};
 use crate::support::folder::RunFolder;
 use crate::support::{self, config, options, parsed, repository_text, setup};
 
@@ -52,9 +52,12 @@ fn measured(run: &Optimised, index: usize) -> f64 {
 
 #[test]
 fn a_limited_mass_is_kept_and_used_up_and_costs_shielding() {
-    let (run, rows) = with("shield_mass_limit.toml", &[], |s| s);
+    let (mut problem, own) = changed("shield_mass_limit.toml", &[]);
+    let mut notes = Notes::default();
+    let (run, rows) = optimised(&mut problem, &own, &mut notes);
     let ratio = run.best.objective / run.initial;
     println!("{:?}: F/F0 {ratio:.4}, {:.6} kg", run.stop_reason, measured(&run, 0));
+    assert!(!notes.0.iter().any(|note| note.contains("the initial design violates")), "{:?}", notes.0);
     // Active at the optimum: all of the mass is used, but for what `ftol_rel` leaves.
     assert!(measured(&run, 0) <= 2.5 * (1.0 + 1e-4) && measured(&run, 0) > 2.5 * (1.0 - 1e-2));
     assert!(run.best.violation == 0.0 && ratio < 0.7, "{ratio}");
@@ -158,10 +161,14 @@ fn what_is_beyond_a_bound_by_little_is_taken_a_step_back() {
 fn a_design_that_starts_outside_is_led_inside() {
     // The flat plate has 2.26 kg.
     let few = |s| Optimizer { max_evaluations: 12, ..s };
-    let (run, rows) = with("shield_mass_limit.toml", &[("\"2.5 kg\"", "\"2.2 kg\"")], few);
+    let (mut problem, own) = changed("shield_mass_limit.toml", &[("\"2.5 kg\"", "\"2.2 kg\"")]);
+    let mut notes = Notes::default();
+    let (run, rows) = optimised(&mut problem, &few(own), &mut notes);
     assert!(rows[0].constraints["c_mass_plate"] > 0.0);
     println!("{:.6} kg after {} evaluations", measured(&run, 0), rows.len());
     assert!(run.best.violation == 0.0 && run.best.evaluation > 0);
+    let said: Vec<&String> = notes.0.iter().filter(|note| note.contains("the initial design violates")).collect();
+    assert!(said.len() == 1 && said[0].contains("violates `mass_plate`:"), "{:?}", notes.0);
 }
 
 #[test]

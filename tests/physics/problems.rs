@@ -41,6 +41,20 @@ pub(crate) fn quick(overrides: &[&str]) -> (Problem, Optimizer) {
     (setup.problem, config.optimizer)
 }
 
+/// What a run notes and warns of.
+#[derive(Default)]
+pub(crate) struct Notes(pub(crate) Vec<String>);
+
+impl Observer for Notes {
+    fn note(&mut self, message: &str) {
+        self.0.push(message.to_owned());
+    }
+
+    fn warning(&mut self, message: &str) {
+        self.0.push(message.to_owned());
+    }
+}
+
 /// Keeps rows and residuals of the history, and may fail at one of them.
 #[derive(Default)]
 pub(crate) struct Rows {

@@ -269,8 +269,8 @@ impl Session<'_> {
             Ok(Some(CrossChecked::Ratio(found))) => return Some(found),
             Ok(Some(CrossChecked::NotResolved([found, own]))) => observer.notice(&format!(
                 "the best shape is not checked by other elements: those of first order have {found:.3e} for the objective or a term \
-                 of it at the initial shape, {own:.3e} of this run, and do not resolve a gain of {:.3e}",
-                (of_run[0] - of_run[1]).abs()
+                 of it at the initial shape, {own:.3e} of this run, and do not resolve a change of {:.3e}",
+                of_run[1] - of_run[0]
             )),
             Ok(None) => {}
             Err(error) => observer.notice(&format!("there is no check by other elements: {error}")),

@@ -77,9 +77,10 @@ pub enum RemeshError {
     },
     /// A motion inverts an element.
     #[error(
-        "the motion inverts element {element} of region `{region}` at {}: only {fraction:.4} of \
+        "the motion inverts element {element} of region `{region}` at {}: only {:.4} of \
          it can be taken; move less, enlarge the remesh region or change its stiffness",
-        millimetres(*centroid)
+        millimetres(*centroid),
+        (1e4 * fraction).floor().min(9999.0) / 1e4
     )]
     Inverted {
         element: ElementId,

@@ -2,11 +2,11 @@
 
 use fluxmorph::config::{Algorithm, Optimizer};
 use fluxmorph::files::StopReason;
-use fluxmorph::show::{Evaluation, Observer, Silent};
+use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::driver::Optimised;
 use fluxmorph_optimizer::problem::{Problem, Shape};
 
-use crate::problems::{optimised, quick};
+use crate::problems::{Notes, optimised, quick};
 use crate::support::device::{BLOCK, HYPERELASTIC};
 use crate::support::{changed, setup_of};
 
@@ -24,20 +24,6 @@ fn every_algorithm_improves_the_shield_within_its_bounds() {
         for (k, p) in optimised.best.values.iter().enumerate() {
             assert!(shape.lower()[k] <= *p && *p <= shape.upper()[k], "{algorithm:?}: variable {k} is {p}");
         }
-    }
-}
-
-/// The lines of a run.
-#[derive(Default)]
-struct Notes(Vec<String>);
-
-impl Observer for Notes {
-    fn note(&mut self, message: &str) {
-        self.0.push(message.to_owned());
-    }
-
-    fn warning(&mut self, message: &str) {
-        self.0.push(message.to_owned());
     }
 }
 
