@@ -167,7 +167,8 @@ fn a_design_that_starts_outside_is_led_inside() {
     assert!(rows[0].constraints["c_mass_plate"] > 0.0);
     println!("{:.6} kg after {} evaluations", measured(&run, 0), rows.len());
     assert!(run.best.violation == 0.0 && run.best.evaluation > 0);
-    let said: Vec<&String> = notes.0.iter().filter(|note| note.contains("the initial design violates")).collect();
+    let said: Vec<&String> =
+        notes.0.iter().filter(|note| note.contains("the initial design violates")).collect();
     assert!(said.len() == 1 && said[0].contains("violates `mass_plate`:"), "{:?}", notes.0);
 }
 

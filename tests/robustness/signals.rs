@@ -189,6 +189,48 @@ fn the_second_signal_ends_a_run_at_once_and_it_can_be_gone_on_with() {
     assert_same(&essence(&files(&out)), &expected, "left at once");
 }
 
+/// The library that orders matrices puts a handler of its own in the place of any while it works, which jumps anywhere on other
+/// threads than its own: no signal may reach one.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_signal_while_a_matrix_is_ordered_ends_a_command_as_at_any_other_moment() {
+    use std::os::unix::process::ExitStatusExt;
+    const TERM: i32 = 15;
+    let home = folder();
+    let out = home.path().join("out");
+    let device = shipped("shield", &[]).with("analysis.order=2");
+    for trial in 0..8 {
+        let mut solve = device.command("solve", &out).arg("--force").spawn().expect("the program starts");
+        std::thread::sleep(Duration::from_millis(150 * (trial + 1)));
+        if trial == 7 {
+            assert_eq!(threads_that_take(TERM, solve.id()), Vec::<String>::new());
+        }
+        send("TERM", solve.id());
+        std::thread::sleep(Duration::from_millis(50));
+        if solve.try_wait().expect("a child of this process").is_none() {
+            // The first lets the work in hand be finished.
+            send("TERM", solve.id());
+        }
+        let status = end_of(&mut solve);
+        // In the first moments of a process it has its default.
+        assert!(status.code() == Some(143) || status.signal() == Some(TERM), "trial {trial}: {status}");
+    }
+}
+
+/// The threads of a process that do not block a signal.
+#[cfg(target_os = "linux")]
+fn threads_that_take(signal: i32, process: u32) -> Vec<String> {
+    let threads = std::fs::read_dir(format!("/proc/{process}/task")).expect("it runs");
+    let takes = |status: &String| {
+        let mask = status.lines().find_map(|line| line.strip_prefix("SigBlk:")).expect("a mask");
+        u64::from_str_radix(mask.trim(), 16).expect("it is hexadecimal") >> (signal - 1) & 1 == 0
+    };
+    threads
+        .filter_map(|thread| std::fs::read_to_string(thread.ok()?.path().join("status")).ok())
+        .filter(takes)
+        .collect()
+}
+
 #[test]
 fn a_single_solve_is_finished_and_a_second_signal_leaves_it() {
     let home = folder();

@@ -1,16 +1,18 @@
 //! Signals: the first asks the command to end after the current work, the second ends the process at once.
 //!
-//! The second needs no help of a thread that may be busy: the handler itself ends the process. The files of a run bear
-//! that at any moment.
+//! One thread waits for them; all others block them, and no handler is installed: METIS replaces that of SIGTERM during its calls
+//! by one of its own, which jumps to where the thread that called METIS began, whichever thread the signal meets. The thread
+//! has nothing else to do, so that the second signal needs no help of one that may be busy. The files of a run bear its
+//! end at any moment.
 
 use std::io::Write;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use fluxmorph_optimizer::Error as OptimizerError;
+use nix::sys::signal::{SigSet, Signal as Number};
 use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
-use signal_hook::flag;
-use signal_hook::iterator::Signals;
+use signal_hook::{flag, low_level};
 
 use super::ranks::is_worker;
 use super::{ExitCode, launcher};
@@ -39,11 +41,8 @@ impl Signal {
 
     /// The exit code of the signal received, if any.
     pub(super) fn received(&self) -> Option<ExitCode> {
-        match i32::try_from(self.number.load(Ordering::SeqCst)) {
-            Ok(SIGINT) => Some(ExitCode::Interrupted),
-            Ok(SIGTERM | SIGUSR1) => Some(ExitCode::Terminated),
-            _ => None,
-        }
+        let number = i32::try_from(self.number.load(Ordering::SeqCst)).unwrap_or_default();
+        (number != 0).then(|| exit_code(number))
     }
 
     /// The exit code of an outcome: where a signal ended the command before it had a result, that of the signal, with a
@@ -62,45 +61,76 @@ impl Signal {
     }
 }
 
-/// Watches for Ctrl-C and SIGTERM; `message` is shown when the first comes. Where the system refuses a handler, its default
-/// (ending at once) stays.
-pub(super) fn watch(message: &'static str) -> Signal {
-    let number = Arc::new(AtomicUsize::new(0));
-    let again = Arc::new(AtomicBool::new(false));
+/// A command that ends by itself after a signal.
+struct Watched {
+    number: Arc<AtomicUsize>,
+    message: &'static str,
+}
+
+/// The command of this process, from when it watches for signals.
+static WATCHED: OnceLock<Watched> = OnceLock::new();
+
+/// Has a thread wait for Ctrl-C and SIGTERM, which this thread and all that it starts block; the first thing that a process does.
+/// Until a command watches for them, they end the process. Where the system refuses, their default (ending at once) stays.
+pub(super) fn wait_for_signals() {
     // `mpirun` hands SIGUSR1 on to its ranks, and kills them soon after anything else.
-    let of_launcher = launcher::is_launched().then_some((SIGUSR1, ExitCode::Terminated));
-    let signals = [(SIGINT, ExitCode::Interrupted), (SIGTERM, ExitCode::Terminated)];
-    for (signal, code) in signals.into_iter().chain(of_launcher) {
-        // Order matters: the shutdown looks at what an earlier signal has set.
-        let _ = flag::register_conditional_shutdown(signal, code as i32, Arc::clone(&again))
-            .and_then(|_| flag::register_usize(signal, Arc::clone(&number), signal as usize))
-            .and_then(|_| flag::register(signal, Arc::clone(&again)));
+    let of_launcher = launcher::is_launched().then_some(Number::SIGUSR1);
+    let signals: SigSet = [Number::SIGINT, Number::SIGTERM].into_iter().chain(of_launcher).collect();
+    if signals.thread_block().is_err() {
+        return;
     }
-    // A handler must not write; a thread of its own does, while the others compute.
-    if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM]) {
-        // Of several ranks one speaks.
-        let speaks = !is_worker();
-        std::thread::spawn(move || {
-            if signals.forever().next().is_some() && speaks {
-                // A second signal ends the process where it stands: from here on nothing is left to tidy up.
-                show::clear();
-                let _ = writeln!(std::io::stderr(), "{message}");
-            }
+    let waiting = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+        while let Ok(signal) = signals.wait() {
+            arrive(signal as i32);
+        }
+    });
+    if waiting.is_err() {
+        let _ = signals.thread_unblock();
+    }
+}
+
+/// What a signal does.
+fn arrive(signal: i32) {
+    let Some(watched) = WATCHED.get() else {
+        let _ = low_level::emulate_default_handler(signal);
+        return;
+    };
+    let first = watched.number.compare_exchange(0, signal as usize, Ordering::SeqCst, Ordering::SeqCst);
+    if first.is_err() {
+        // Where it stands, without what is to be done at an ordinary end: the other threads are at work.
+        low_level::exit(exit_code(signal) as i32);
+    }
+    // Of several ranks one speaks. Standard error may take nothing for long, and the next signal has to be seen.
+    if !is_worker() && signal != SIGUSR1 {
+        let message = watched.message;
+        let _ = std::thread::Builder::new().spawn(move || {
+            // A second signal ends the process where it stands: from here on nothing is left to tidy up.
+            show::clear();
+            let _ = writeln!(std::io::stderr(), "{message}");
         });
     }
+}
+
+fn exit_code(signal: i32) -> ExitCode {
+    if signal == SIGINT { ExitCode::Interrupted } else { ExitCode::Terminated }
+}
+
+/// Has the first signal set a number instead of ending the process; `message` is shown then.
+pub(super) fn watch(message: &'static str) -> Signal {
+    let number = Arc::new(AtomicUsize::new(0));
+    let watched = WATCHED.get_or_init(|| Watched { number, message });
     if std::env::var_os(ENDS_WITH_STDIN).is_some() {
         std::thread::spawn(|| {
             // Whoever started this process holds the other end and writes nothing: it has ended.
             let _ = std::io::copy(&mut std::io::stdin().lock(), &mut std::io::sink());
-            let _ = signal_hook::low_level::raise(SIGTERM);
+            arrive(SIGTERM);
         });
     }
-    Signal { number }
+    Signal { number: Arc::clone(&watched.number) }
 }
 
 /// Lets a write beyond the limit on the size of files fail like any other, with the file named; by default the system ends
 /// the process.
 pub(super) fn survive_file_size_limits() {
-    #[cfg(unix)]
     let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }

@@ -14,6 +14,9 @@ const LEAST_GAIN: f64 = 1e-5;
 /// have been measured (docs/verification.md, 2.12).
 pub const SAFETY: f64 = 2.0;
 
+/// Share of a loss, or of an objective, that impedance surfaces may leave out without a word.
+pub const LEAST_LEFT_OUT: f64 = 0.01;
+
 /// The share of the relative error of a value that need not cancel in the ratio of two designs, however alike their estimates
 /// are: an estimate has an error itself. `shield_two_loads.toml` at a quarter of its refinement has estimates of 1.2 of both
 /// values, whose difference is 8e-5 of the ratio; on meshes with 0.9 and 1.4 of its refinement the ratio differs by 1.2e-2.

@@ -23,7 +23,9 @@ mod synced;
 
 use std::path::{Path, PathBuf};
 
-pub use accuracy::{Accuracy, CrossCheck, CurvedFacets, Level, SAFETY, Verdict, relative_bar};
+pub use accuracy::{
+    Accuracy, CrossCheck, CurvedFacets, LEAST_LEFT_OUT, Level, SAFETY, Verdict, relative_bar,
+};
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFile, DesignFileError, read_design};
 pub use disk::{Disk, DiskFile, DiskLock, Sharing, system_disk};

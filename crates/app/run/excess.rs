@@ -6,27 +6,26 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::Readable;
+use fluxmorph_geometry::fem::c64;
 use fluxmorph_optimizer::constraint::{Bound, Quantity};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::audit::{ExcessLoss, excess_losses};
-use fluxmorph_solver::circuit::currents;
+use fluxmorph_solver::circuit::{currents, powers};
 use fluxmorph_solver::{FieldModel, FieldSolution};
 
 use super::Session;
 use super::reported::under;
 use crate::config::ObjectiveKind;
+use crate::files::LEAST_LEFT_OUT;
 use crate::show::Observer;
-
-/// Share of a loss, or of an objective, that may be left out without a word.
-const UNSAID: f64 = 0.01;
 
 /// What impedance surfaces leave out of losses in words, of each conductor where that is the largest share.
 pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
     let mut worst: BTreeMap<String, (ExcessLoss, &FieldModel)> = BTreeMap::new();
     for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
         for found in excess_losses(model, &analysis.mesh, solution) {
-            let largest = worst.get(&found.region).map_or(UNSAID, |(own, _)| own.share().abs());
+            let largest = worst.get(&found.region).map_or(LEAST_LEFT_OUT, |(own, _)| own.share().abs());
             if found.share().abs() > largest {
                 worst.insert(found.region.clone(), (found, model));
             }
@@ -58,8 +57,17 @@ pub(super) struct LeftOut(Vec<OfState>);
 struct OfState {
     /// Of losses, by region [W].
     losses: BTreeMap<String, f64>,
-    /// The current of the one coil, where all losses are its [A].
-    current: Option<f64>,
+    /// The one coil, where all losses are its.
+    coil: Option<OneCoil>,
+}
+
+/// The only coil of a device.
+#[derive(Clone, Copy)]
+struct OneCoil {
+    /// Its current [A].
+    current: f64,
+    /// Its power, complex [W].
+    power: c64,
 }
 
 impl OfState {
@@ -67,11 +75,16 @@ impl OfState {
     fn more(&self, kind: &str, region: Option<&String>) -> Option<f64> {
         let is = |own: ObjectiveKind| kind == own.name();
         let all = || self.losses.values().copied().reduce(|a, b| a + b);
-        let squared = self.current.map(|current| current * current).filter(|squared| *squared > 0.0);
+        let coil = self.coil.filter(|coil| coil.current > 0.0);
         match region {
             Some(region) if is(ObjectiveKind::Loss) => self.losses.get(region).copied(),
-            _ if is(ObjectiveKind::Power) && squared.is_some() => all(),
-            _ if is(ObjectiveKind::Resistance) => Some(2.0 * all()? / squared?),
+            _ if is(ObjectiveKind::Power) && coil.is_some() => all(),
+            _ if is(ObjectiveKind::Resistance) => Some(2.0 * all()? / coil?.current.powi(2)),
+            // Q = X/R: the reactance stays.
+            _ if is(ObjectiveKind::QualityFactor) => {
+                let power = coil?.power;
+                Some(power.im / (power.re + all()?) - power.im / power.re)
+            }
             _ => None,
         }
     }
@@ -83,11 +96,14 @@ impl LeftOut {
         let of_state = |(model, solution): (&FieldModel, &FieldSolution)| {
             let found = excess_losses(model, &analysis.mesh, solution).into_iter();
             let losses = found.map(|own| (own.region.clone(), own.more())).collect();
-            let current = match &currents(model, solution)[..] {
-                [(_, current)] if model.coils().len() == 1 => Some(current.norm()),
+            let of_coils = (currents(model, solution), powers(model, &analysis.mesh, solution));
+            let coil = match (&of_coils.0[..], &of_coils.1[..]) {
+                ([(_, current)], [(_, power)]) if model.coils().len() == 1 => {
+                    Some(OneCoil { current: current.norm(), power: *power })
+                }
                 _ => None,
             };
-            OfState { losses, current }
+            OfState { losses, coil }
         };
         Self(problem.states().iter().zip(&analysis.solutions).map(of_state).collect())
     }
@@ -130,7 +146,7 @@ impl LeftOut {
         let of = |(k, more): (usize, f64)| {
             let (bound, value) = (&bounds[k], analysis.constraints[k].value);
             let beyond = bound.excess(value + more - of_bound(k)?);
-            (bound.is_satisfied(value) && beyond > UNSAID).then(|| {
+            (bound.is_satisfied(value) && beyond > LEAST_LEFT_OUT).then(|| {
                 format!(
                     "the constraint `{}` keeps its bound by the loss of impedance surfaces; with what these leave out at sharp \
                      edges and where they are round it is about {:.1} % beyond",
@@ -170,7 +186,7 @@ impl Session<'_> {
 /// anything.
 pub(super) fn described([at_initial, at_best]: [f64; 2], [initial, best]: [f64; 2]) -> Option<String> {
     let [first, last] = [at_initial / initial.abs(), at_best / best.abs()];
-    (first.abs().max(last.abs()) > UNSAID).then(|| {
+    (first.abs().max(last.abs()) > LEAST_LEFT_OUT).then(|| {
         format!(
             "what impedance surfaces leave out, at sharp edges and where they are round, changes the objective by about {:+.2} % at \
              the initial and {:+.2} % at the best design, of what it is there, and F/F0 from {:.5} to {:.5}, which no \
@@ -190,14 +206,16 @@ mod tests {
     #[test]
     fn what_is_left_out_is_of_losses_and_of_what_one_coil_sees_of_them() {
         let losses = BTreeMap::from([("plate".to_owned(), 3.0), ("wall".to_owned(), 1.0)]);
-        let mut state = OfState { losses, current: Some(4.0) };
+        let coil = OneCoil { current: 4.0, power: c64::new(6.0, 60.0) };
+        let mut state = OfState { losses, coil: Some(coil) };
         let plate = "plate".to_owned();
         assert_eq!(state.more("loss", Some(&plate)), Some(3.0));
         assert_eq!(state.more("loss", Some(&"meshed".to_owned())), None);
         assert_eq!(state.more("power", None), Some(4.0));
         assert_eq!(state.more("resistance", None), Some(0.5), "2 P / I²");
+        assert_eq!(state.more("quality_factor", None), Some(-4.0), "60 / 10 less 60 / 6");
         assert_eq!(state.more("energy", Some(&plate)), None);
-        state.current = None;
+        state.coil = None;
         assert_eq!(state.more("resistance", None), None, "of several coils nothing is known");
     }
 

@@ -69,6 +69,11 @@ impl DirectoryRecorder {
         !self.replayed.is_empty()
     }
 
+    /// The refinements of the mesh that the first of these evaluations was made after.
+    pub(super) fn first_level(&self) -> Option<usize> {
+        self.replayed.front().map(|record| record.row.level)
+    }
+
     /// Writes the field of the best design with what each element adds to its estimated error, where fields are kept.
     pub(super) fn write_error(
         &self,
@@ -100,6 +105,16 @@ impl DirectoryRecorder {
 
     /// Keeps a complete evaluation.
     fn keep(&mut self, record: &Record, analysis: &Analysis, problem: &Problem) -> Result<(), Error> {
+        if let Some(level) = self.first_level() {
+            let cause = format!(
+                "its evaluation {} was made after {level} refinements of the mesh, and what it goes on with has {}: {} tells of \
+                 other ones than were made; restore it, or begin the run again",
+                record.row.evaluation,
+                record.row.level,
+                self.directory.refinements().display()
+            );
+            return Err(Error::NotResumable { path: self.directory.path().to_owned(), cause });
+        }
         let is_first = self.level != Some(record.row.level);
         self.level = Some(record.row.level);
         if is_wanted(self.kept, record, is_first) {

@@ -78,7 +78,7 @@ impl<'a> Session<'a> {
         let mut limit = TimeLimit::starting_now(settings.max_time);
         let mut levels = self.levels(observer)?;
         if let Some(levels) = &mut levels {
-            self.refine_before_search(levels, recorder.is_replaying(), &mut limit, observer)?;
+            self.refine_before_search(levels, recorder.first_level(), &mut limit, observer)?;
         }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
         let mut before: Option<Optimised> = None;
@@ -163,11 +163,12 @@ impl<'a> Session<'a> {
         OptimizerError::check_interrupted(self.interrupted).map_err(|_| OptimizerError::InterruptedRun)
     }
 
-    /// Refines the mesh until the error bar of the initial design is within the tolerance, or the time is over.
+    /// Refines the mesh until the error bar of the initial design is within the tolerance, or the time is over; where a search has
+    /// begun, as often as before it.
     fn refine_before_search(
         &mut self,
         levels: &mut Levels<'a>,
-        has_begun: bool,
+        begun: Option<usize>,
         limit: &mut TimeLimit,
         observer: &mut dyn RunObserver,
     ) -> Result<(), Error> {
@@ -178,7 +179,7 @@ impl<'a> Session<'a> {
                 limit.restart();
                 continue;
             }
-            if has_begun {
+            if begun.is_some_and(|level| levels.made >= level) {
                 return Ok(());
             }
             if limit.is_over() {

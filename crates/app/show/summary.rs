@@ -8,9 +8,9 @@ use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
-    Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, MultipoleResult, ObjectiveResult,
-    RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateErrors, StateResult, Verdict,
-    Verification, VerificationMesh,
+    Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT, MultipoleResult,
+    ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateErrors,
+    StateResult, Verdict, Verification, VerificationMesh,
 };
 use crate::printable::printable;
 
@@ -317,6 +317,13 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         rows.extend(homogeneity(objective));
         if let Some([error, _]) = result.accuracy.as_ref().and_then(|accuracy| accuracy.error_estimate) {
             rows.push(("estimated error", format!("{error:+.1e}{}", named.unit)));
+        }
+        let left_out = result.accuracy.as_ref().and_then(|accuracy| accuracy.excess);
+        if let Some([more, _]) =
+            left_out.filter(|[more, _]| more.abs() > LEAST_LEFT_OUT * objective.best.abs())
+        {
+            let what = "by impedance surfaces at sharp edges and where they are round, in no error";
+            rows.push(("left out", format!("{more:+.1e}{} {what}", named.unit)));
         }
     }
     rows

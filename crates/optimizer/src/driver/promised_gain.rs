@@ -18,6 +18,9 @@ const SWEEPS: usize = 50;
 /// third and to a seventh, and the gradient promised three to five thousand times the tolerance.
 pub(super) const BELIEVED_TOLERANCES: f64 = 100.0;
 
+/// Multiple of the tolerance below which nothing is promised: a search from there finds rounding.
+pub(super) const HELD_TOLERANCES: f64 = 0.01;
+
 /// The gain between the bounds, relative to the value of the sample, by the multipliers of least norm.
 pub(super) fn promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
     let room = Room { design, lower, upper };

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::incumbent::{BestField, Comparison, Incumbent, Initial};
 use super::near_miss::NearMiss;
-use super::promised_gain::{BELIEVED_TOLERANCES, least_promised_gain, promised_gain};
+use super::promised_gain::{BELIEVED_TOLERANCES, HELD_TOLERANCES, least_promised_gain, promised_gain};
 use super::stop::Stop;
 use super::{Observer, Optimised, Record, Recorder, Settings, Start, StopReason, Supervisor};
 use crate::error::Error;
@@ -282,9 +282,17 @@ impl<'a> Run<'a> {
     /// What the gradient promises at the best design at least, where a search that has gained nothing is not to be believed for it.
     pub(super) fn surely_promised(&self) -> Option<f64> {
         self.promised(BELIEVED_TOLERANCES)?;
+        self.least_promised().filter(|least| *least > BELIEVED_TOLERANCES * self.settings.least_gain())
+    }
+
+    /// Whether bounds and constraints together leave nothing of what the gradient promises at the best design.
+    pub(super) fn is_held(&self) -> bool {
+        self.least_promised().is_some_and(|least| least < HELD_TOLERANCES * self.settings.least_gain())
+    }
+
+    fn least_promised(&self) -> Option<f64> {
         let (best, shape) = (self.best.as_ref()?, self.shape());
-        let least = least_promised_gain(&best.sample, &best.values, shape.lower(), shape.upper());
-        (least > BELIEVED_TOLERANCES * self.settings.least_gain()).then_some(least)
+        Some(least_promised_gain(&best.sample, &best.values, shape.lower(), shape.upper()))
     }
 
     /// What the gradient promises at the best design, where that is more than so many times the tolerance of the objective and more

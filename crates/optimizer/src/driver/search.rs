@@ -170,7 +170,7 @@ impl<'a> Search<'a> {
         let held_back = self.trust.holds_back(run.shape(), &run.centre());
         match &self.refused {
             _ if held_back && gained => NextStep::MoveTrustRegion,
-            _ if gained && promised.is_some() => NextStep::SearchOn,
+            _ if gained && promised.is_some() && !run.is_held() => NextStep::SearchOn,
             _ if unbelieved.is_some() => NextStep::TightenTolerance { promised: unbelieved },
             Some(refusal) if held_back && self.trust.scale < 1.0 => {
                 self.after_refusal(run, refusal.clone(), gained)

@@ -32,7 +32,9 @@ use crate::space::Space;
 use crate::unknowns::Unknowns;
 pub(crate) use border::{Border, Excitation};
 pub(crate) use solids::{SolidRows, Solids};
-pub use terminals::{CoilTerminals, Terminals, currents, direct_resistances, flux_linkages, terminals};
+pub use terminals::{
+    CoilTerminals, Terminals, currents, direct_resistances, flux_linkages, powers, terminals,
+};
 
 /// A coil's winding, and the circuit that it is in.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -35,6 +35,13 @@ pub struct Terminals {
     pub inductance: Vec<Vec<f64>>,
 }
 
+impl Driven {
+    /// Across the coil with its resistance, without what else is in series [V].
+    fn voltage(&self, model: &FieldModel, current: c64, linkage: c64) -> c64 {
+        self.winding.resistance * current + c64::new(0.0, model.angular_frequency()) * linkage
+    }
+}
+
 impl Windings {
     /// The place among these of the coil with a name.
     pub(crate) fn position(&self, model: &FieldModel, name: &str) -> Option<usize> {
@@ -102,6 +109,18 @@ pub fn currents(model: &FieldModel, solution: &FieldSolution) -> Vec<(String, c6
     windings.coils.iter().enumerate().map(of).collect()
 }
 
+/// Complex powers `½ V I*` [W] of the coils with windings in a state, with their names: of the voltage across a coil with its
+/// resistance.
+pub fn powers(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<(String, c64)> {
+    let windings = model.windings();
+    let of = |(k, driven): (usize, &Driven)| {
+        let current = windings.current(k, model, solution);
+        let voltage = driven.voltage(model, current, windings.linkage(k, model, mesh, solution));
+        (model.coils()[driven.coil].name.clone(), 0.5 * voltage * current.conj())
+    };
+    windings.coils.iter().enumerate().map(of).collect()
+}
+
 /// Resistances [Ω] of the solid conductors in statics with what is in series, by their names: they are known without the field. None
 /// above 0 Hz.
 pub fn direct_resistances(model: &FieldModel) -> Vec<(String, f64)> {
@@ -139,7 +158,7 @@ pub fn terminals(
             flux_linkage,
             // Re(jωL) = −ω Im L.
             resistance: wire - mutual.get(k).map_or(0.0, |row| angular_frequency * row[k].im),
-            voltage: wire * current + c64::new(0.0, angular_frequency) * flux_linkage,
+            voltage: driven.voltage(model, current, flux_linkage),
         }
     };
     Ok(Terminals {

@@ -94,6 +94,24 @@ impl Patch {
             .collect()
     }
 
+    /// A field constant on each element, averaged over the elements around each node by their volumes, and over the nodes of each
+    /// element: of a field between elements an approximation of one order more.
+    pub(super) fn smoothed(&self, field: &[Point]) -> Vec<Point> {
+        let mut sums = vec![([0.0; 3], 0.0); self.points.len()];
+        for ((nodes, tet), u) in self.connectivity.iter().zip(&self.tets).zip(field) {
+            for n in nodes {
+                let (sum, volume) = &mut sums[n.index()];
+                *sum = std::array::from_fn(|d| sum[d] + tet.volume * u[d]);
+                *volume += tet.volume;
+            }
+        }
+        let mean = |nodes: &[NodeId; 4]| {
+            let around = nodes.map(|n| sums[n.index()]);
+            std::array::from_fn(|d| 0.25 * around.iter().map(|(sum, volume)| sum[d] / volume).sum::<f64>())
+        };
+        self.connectivity.iter().map(mean).collect()
+    }
+
     /// `∫u·v dV` of two fields constant on each element.
     pub(super) fn inner(&self, u: &[Point], v: &[Point]) -> f64 {
         self.tets.iter().zip(u).zip(v).map(|((tet, u), v)| tet.volume * dot(*u, *v)).sum()

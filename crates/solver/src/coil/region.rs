@@ -6,7 +6,8 @@
 //! 1. conduction: between terminals `h = −∇φ`, `∫∇φ·∇q = 0`, `φ = 1` and `0` on them; in a closed ring
 //!    `h = ∇θ − ∇φ`, `∫(∇θ − ∇φ)·∇q = 0`, with the angle `θ` about a line through the hole, whose gradient is taken of
 //!    its nodal values element by element, so that any line gives the same `h`;
-//! 2. uniform magnitude: `J1 = h/|h|`;
+//! 2. uniform magnitude: `J1 = h/|h|`, with `h` averaged over the elements around each node: that of one element leans to the
+//!    inside of a bend;
 //! 3. projection: `J = J1 − ∇χ`, `∫(J1 − ∇χ)·∇q = 0` for all nodal `q` (zero on terminals);
 //! 4. scale: `∫J·∇φ = −I` between terminals, `∫J·∇θ = 2π I` in a ring. For a `J` with the property of step 3 these are
 //!    exact and do not depend on where a cross-section is laid.
@@ -15,7 +16,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use fluxmorph_geometry::tet4::{Point, Tet4, norm, sub};
+use fluxmorph_geometry::tet4::{Point, Tet4, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
@@ -80,6 +81,9 @@ pub struct RegionCurrent {
 
 /// `|h|` over its root mean square below which an element counts as dead: no current passes it.
 const DEAD: f64 = 1e-9;
+
+/// Cosine of the angle between the direction of an element and that around it from which the latter is taken.
+const LEAST_COSINE: f64 = 0.5;
 
 /// `‖h‖/‖∇θ‖` below which nothing goes round the line: rounding of the solve, far below any ring's.
 pub(super) const NO_RING: f64 = 1e-6;
@@ -197,13 +201,19 @@ fn stranded_current(
     sections: Section<'_>,
 ) -> RegionCurrent {
     let least = DEAD * patch.rms(conduction);
-    let uniform: Vec<Point> = conduction.iter().map(|h| direction(*h, least)).collect();
+    let smoothed = patch.smoothed(conduction);
+    let uniform = |(h, smoothed): (&Point, &Point)| {
+        let (own, around) = (direction(*h, least), direction(*smoothed, least));
+        // Where parts touch that carry the current to and fro, the mean is neither's.
+        if dot(own, around) > LEAST_COSINE { around } else { own }
+    };
+    let uniform: Vec<Point> = conduction.iter().zip(&smoothed).map(uniform).collect();
     let chi = problem.solve(&uniform, &vec![0.0; patch.points.len()]);
     let correction = patch.gradient(&chi);
     let projected: Vec<Point> = uniform.iter().zip(&correction).map(|(j, c)| sub(*j, *c)).collect();
     let mut through = vec![0.0; patch.parts];
     for (e, (j, g)) in projected.iter().zip(guide).enumerate() {
-        through[patch.part_of_element(e)] += patch.tets[e].volume * fluxmorph_geometry::tet4::dot(*j, *g);
+        through[patch.part_of_element(e)] += patch.tets[e].volume * dot(*j, *g);
     }
     let scaled = |field: &[Point]| -> Vec<Point> {
         field.iter().enumerate().map(|(e, j)| j.map(|c| c / through[patch.part_of_element(e)])).collect()
@@ -221,8 +231,7 @@ fn stranded_current(
 
 /// `∫J·∇λ_a` for the vertices of every element.
 fn into_vertices(patch: &Patch, current: &[Point]) -> Vec<[f64; 4]> {
-    let of =
-        |(tet, j): (&Tet4, &Point)| tet.gradients.map(|g| tet.volume * fluxmorph_geometry::tet4::dot(*j, g));
+    let of = |(tet, j): (&Tet4, &Point)| tet.gradients.map(|g| tet.volume * dot(*j, g));
     patch.tets.iter().zip(current).map(of).collect()
 }
 
