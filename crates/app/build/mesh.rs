@@ -96,7 +96,7 @@ fn parameter_fault(error: MeshError, source: &SourceMap) -> Error {
 fn file_fault(error: MeshError, source: &SourceMap) -> Error {
     match error {
         MeshError::Msh { path, cause } => msh_fault(&path, &cause, source).into(),
-        MeshError::File { path, cause } => OutputError::io("read", path)(cause).into(),
+        MeshError::File { path, cause } => OutputError::io("read mesh.file", path)(cause).into(),
         other => other.into(),
     }
 }

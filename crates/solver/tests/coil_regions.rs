@@ -169,16 +169,20 @@ fn moment(mesh: &Mesh, current: &RegionCurrent) -> f64 {
 
 /// The direction of conduction in one element leans to the inside of a bend, and the current of the winding with it.
 #[test]
-fn the_current_of_a_ring_is_no_nearer_to_the_inside_than_its_chords() {
+fn the_current_of_a_ring_is_hardly_nearer_to_the_inside_than_its_chords() {
     for chords in [12, 24, 48] {
         let mesh = ring([3, chords, 3]);
         let current = around(&mesh, z_axis([0.0; 3])).expect("a ring");
         let angle = TAU / chords as f64;
-        let of_chords = 0.5 * chords as f64 * angle.sin();
-        let exact = of_chords * (OUTER.powi(3) - INNER.powi(3)) / (3.0 * (OUTER - INNER));
-        let off = moment(&mesh, &current) / exact - 1.0;
-        println!("{chords} chords: moment {off:+.5} off that of their polygons");
-        assert!(off.abs() < 1.0);
+        let of_chords = angle.sin() / angle;
+        let of_circles = TAU * (OUTER.powi(3) - INNER.powi(3)) / (6.0 * (OUTER - INNER));
+        let off = moment(&mesh, &current) / (of_chords * of_circles) - 1.0;
+        println!(
+            "{chords} chords: moment {off:+.5} off that of their polygons, these {:+.5}",
+            of_chords - 1.0
+        );
+        // With the direction of each element itself 0.96 of it.
+        assert!(off.abs() < 0.4 * (1.0 - of_chords), "{off}");
     }
 }
 

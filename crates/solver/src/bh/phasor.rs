@@ -145,6 +145,7 @@ impl PhasorLaw {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bh::{Analytic, Knee};
     use crate::material::VACUUM_PERMEABILITY;
 
     fn curve() -> BhCurve {
@@ -170,6 +171,38 @@ mod tests {
             [re(1.6), im(1e-9), re(0.2)],
             [re(0.0); 3],
         ]
+    }
+
+    /// What a field of one direction loses by the law where `H` is given: the fundamental of `B`, and the mean of its square.
+    #[test]
+    fn beyond_the_knee_an_alternating_field_has_a_larger_fundamental_and_mean_square_than_the_law() {
+        let law = Analytic::new(1000.0, 2.0, Knee::Sharp).expect("a law");
+        let curve = BhCurve::analytic(law);
+        let at_knee = curve.at(2.0).field_strength;
+        let inverse = |h: f64| {
+            let (mut low, mut high) = (0.0, 10.0);
+            for _ in 0..60 {
+                let b = 0.5 * (low + high);
+                if curve.at(b).field_strength < h { low = b } else { high = b }
+            }
+            low
+        };
+        let ratios = |times: f64| {
+            const PHASES: usize = 2000;
+            let peak = inverse(times * at_knee);
+            let phases = (0..PHASES).map(|k| std::f64::consts::PI * (k as f64 + 0.5) / PHASES as f64);
+            let wave = phases.map(|t| (t.sin(), inverse(times * at_knee * t.sin())));
+            let [fundamental, square] = wave.fold([0.0, 0.0], |[f, s], (sine, b)| [f + b * sine, s + b * b]);
+            [2.0 * fundamental / peak, 2.0 * square / (peak * peak)].map(|sum| sum / PHASES as f64)
+        };
+        for (times, [fundamental, square]) in [0.5, 3.0, 30.0].map(|times| (times, ratios(times))) {
+            println!(
+                "{times} times the field at the knee: fundamental {fundamental:.3}, mean square {square:.3}"
+            );
+        }
+        assert!(ratios(0.5).iter().all(|ratio| (ratio - 1.0).abs() < 1e-3), "{:?}", ratios(0.5));
+        let [fundamental, square] = ratios(30.0);
+        assert!((1.2..4.0 / std::f64::consts::PI).contains(&fundamental) && (1.8..2.0).contains(&square));
     }
 
     #[test]
