@@ -234,4 +234,10 @@ fn refinements_that_are_not_those_of_the_run_are_refused() {
         kept.refinements[0].marked.pop();
     });
     assert!(error.contains("it makes another mesh than it says"), "{error}");
+    // The second one, of the best design, as if it had been made before the search: nothing is written behind what the journal has.
+    let error = damaged(&|kept| kept.refinements[1].evaluations = 0);
+    assert!(
+        error.contains("on a mesh of 2 refinements, where the journal has one on a mesh of 1"),
+        "{error}"
+    );
 }

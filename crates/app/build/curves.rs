@@ -97,7 +97,7 @@ impl Curves {
             "iron with a B–H curve above 0 Hz: the largest and the least |B| of a period follow the curve, and of what alternates \
              the fundamental alone is computed (effective reluctivity). That is an approximation, which no error bar counts: far \
              beyond the knee, where the current is given and the field alternates in one direction, fluxes and voltages are up to \
-             21 % too low, mean forces and energies up to 50 %, and losses were by 9 to 11 %"
+             21 % too low, mean forces and energies up to 50 %, and losses of eddy currents about 10 %"
                 .to_owned()
         });
         let of_curves = self.curves.iter().filter(|(name, _)| used(name));

@@ -214,12 +214,12 @@ fn opposite_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Ve
     }
     let is_designed = |n: &NodeId| surface.nodes().binary_search(n).is_ok();
     let named = remesh.fixed.iter().chain(&remesh.slide);
-    let named = named.filter_map(|name| mesh.topology().surface(name).ok()).flatten().flatten();
-    let stays: BTreeSet<NodeId> = named.copied().collect();
+    let named = named.filter_map(|name| mesh.topology().surface(name).ok()).flatten();
+    let stays: BTreeSet<[NodeId; 3]> = named.map(|face| face_key(*face)).collect();
     let of = |free: &String| {
         let across = |face: &&[NodeId; 3]| {
             let normal = area_vector(face.map(|n| mesh.point(n)));
-            let moves = !face.iter().any(is_designed) && !face.iter().all(|n| stays.contains(n));
+            let moves = !face.iter().any(is_designed) && !stays.contains(&face_key(**face));
             moves && dot(normal, *along).abs() > ACROSS * norm(normal) * norm(*along)
         };
         let face = mesh.topology().surface(free).ok()?.iter().find(across)?;

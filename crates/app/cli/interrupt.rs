@@ -1,9 +1,10 @@
 //! Signals: the first asks the command to end after the current work, the second ends the process at once.
 //!
-//! One thread waits for them; all others block them, and no handler is installed: METIS replaces that of SIGTERM during its calls
-//! by one of its own, which jumps to where the thread that called METIS began, whichever thread the signal meets. The thread
-//! has nothing else to do, so that the second signal needs no help of one that may be busy. The files of a run bear its
-//! end at any moment.
+//! METIS replaces the handler of SIGTERM during its calls by one of its own, which jumps to where the thread that called METIS began,
+//! whichever thread it runs in. So no thread of this program takes SIGTERM: all block it, and one waits for it. Libraries that
+//! start threads before `main` do, as OpenBLAS of builds with PETSc; for these there is a handler as well. The threads that
+//! wait have nothing else to do, so that the second signal needs no help of one that may be busy. The files of a run bear
+//! its end at any moment.
 
 use std::io::Write;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -11,7 +12,8 @@ use std::sync::{Arc, OnceLock};
 
 use fluxmorph_optimizer::Error as OptimizerError;
 use nix::sys::signal::{SigSet, Signal as Number};
-use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1};
+use signal_hook::consts::{SIGINT, SIGTERM, SIGUSR1, SIGXFSZ};
+use signal_hook::iterator::Signals;
 use signal_hook::{flag, low_level};
 
 use super::ranks::is_worker;
@@ -61,6 +63,9 @@ impl Signal {
     }
 }
 
+/// The name of the thread that waits for SIGTERM.
+const WAITING: &str = "signals";
+
 /// A command that ends by itself after a signal.
 struct Watched {
     number: Arc<AtomicUsize>,
@@ -70,36 +75,32 @@ struct Watched {
 /// The command of this process, from when it watches for signals.
 static WATCHED: OnceLock<Watched> = OnceLock::new();
 
-/// Has a thread wait for Ctrl-C and SIGTERM, which this thread and all that it starts block; the first thing that a process does.
-/// Until a command watches for them, they end the process. Where the system refuses, their default (ending at once) stays.
-pub(super) fn wait_for_signals() {
-    // `mpirun` hands SIGUSR1 on to its ranks, and kills them soon after anything else.
-    let of_launcher = launcher::is_launched().then_some(Number::SIGUSR1);
-    let signals: SigSet = [Number::SIGINT, Number::SIGTERM].into_iter().chain(of_launcher).collect();
-    if signals.thread_block().is_err() {
+/// Has a thread wait for SIGTERM, which this thread and all that it starts block; the first thing that a process does. Until a
+/// command watches for signals it ends the process. Where the system refuses, its default (ending at once) stays.
+pub(super) fn wait_for_termination() {
+    let termination: SigSet = [Number::SIGTERM].into_iter().collect();
+    if termination.thread_block().is_err() {
         return;
     }
-    let waiting = std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-        while let Ok(signal) = signals.wait() {
-            arrive(signal as i32);
+    let waiting = std::thread::Builder::new().name(WAITING.to_owned()).spawn(move || {
+        while termination.wait().is_ok() {
+            arrive(SIGTERM);
         }
     });
     if waiting.is_err() {
-        let _ = signals.thread_unblock();
+        let _ = termination.thread_unblock();
     }
 }
 
 /// What a signal does.
 fn arrive(signal: i32) {
-    let Some(watched) = WATCHED.get() else {
-        let _ = low_level::emulate_default_handler(signal);
-        return;
+    let first = |watched: &&Watched| {
+        watched.number.compare_exchange(0, signal as usize, Ordering::SeqCst, Ordering::SeqCst).is_ok()
     };
-    let first = watched.number.compare_exchange(0, signal as usize, Ordering::SeqCst, Ordering::SeqCst);
-    if first.is_err() {
+    let Some(watched) = WATCHED.get().filter(first) else {
         // Where it stands, without what is to be done at an ordinary end: the other threads are at work.
         low_level::exit(exit_code(signal) as i32);
-    }
+    };
     // Of several ranks one speaks. Standard error may take nothing for long, and the next signal has to be seen.
     if !is_worker() && signal != SIGUSR1 {
         let message = watched.message;
@@ -119,6 +120,11 @@ fn exit_code(signal: i32) -> ExitCode {
 pub(super) fn watch(message: &'static str) -> Signal {
     let number = Arc::new(AtomicUsize::new(0));
     let watched = WATCHED.get_or_init(|| Watched { number, message });
+    // `mpirun` hands SIGUSR1 on to its ranks, and kills them soon after anything else.
+    let of_launcher = launcher::is_launched().then_some(SIGUSR1);
+    if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM].into_iter().chain(of_launcher)) {
+        std::thread::spawn(move || signals.forever().for_each(arrive));
+    }
     if std::env::var_os(ENDS_WITH_STDIN).is_some() {
         std::thread::spawn(|| {
             // Whoever started this process holds the other end and writes nothing: it has ended.
@@ -132,5 +138,5 @@ pub(super) fn watch(message: &'static str) -> Signal {
 /// Lets a write beyond the limit on the size of files fail like any other, with the file named; by default the system ends
 /// the process.
 pub(super) fn survive_file_size_limits() {
-    let _ = flag::register(signal_hook::consts::SIGXFSZ, Arc::new(AtomicBool::new(false)));
+    let _ = flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)));
 }

@@ -37,7 +37,7 @@ use args::{Cli, Command, Progress, WorkArgs};
 
 /// Do what the arguments of this process say.
 pub fn main() -> std::process::ExitCode {
-    interrupt::wait_for_signals();
+    interrupt::wait_for_termination();
     interrupt::survive_file_size_limits();
     if let Err(cause) = args::check_environment(|name| std::env::var(name).ok()) {
         let _ = writeln!(std::io::stderr(), "error: {}", printable(&cause));

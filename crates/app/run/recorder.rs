@@ -69,8 +69,8 @@ impl DirectoryRecorder {
         !self.replayed.is_empty()
     }
 
-    /// The refinements of the mesh that the first of these evaluations was made after.
-    pub(super) fn first_level(&self) -> Option<usize> {
+    /// The level of the next evaluation that is to be replayed; `None` where none is left.
+    pub(super) fn next_level(&self) -> Option<usize> {
         self.replayed.front().map(|record| record.row.level)
     }
 
@@ -105,10 +105,11 @@ impl DirectoryRecorder {
 
     /// Keeps a complete evaluation.
     fn keep(&mut self, record: &Record, analysis: &Analysis, problem: &Problem) -> Result<(), Error> {
-        if let Some(level) = self.first_level() {
+        if let Some(level) = self.next_level() {
             let cause = format!(
-                "its evaluation {} was made after {level} refinements of the mesh, and what it goes on with has {}: {} tells of \
-                 other ones than were made; restore it, or begin the run again",
+                "evaluation {} would follow on a mesh of {} refinements, where the journal has one on a mesh of {level}: the \
+                 refinements of `{}` are missing and could not be made again, or are others; restore the file, or begin the run \
+                 again with --force",
                 record.row.evaluation,
                 record.row.level,
                 self.directory.refinements().display()

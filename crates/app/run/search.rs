@@ -78,7 +78,7 @@ impl<'a> Session<'a> {
         let mut limit = TimeLimit::starting_now(settings.max_time);
         let mut levels = self.levels(observer)?;
         if let Some(levels) = &mut levels {
-            self.refine_before_search(levels, recorder.first_level(), &mut limit, observer)?;
+            self.refine_before_search(levels, recorder.next_level(), &mut limit, observer)?;
         }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
         let mut before: Option<Optimised> = None;
@@ -182,7 +182,9 @@ impl<'a> Session<'a> {
             if begun.is_some_and(|level| levels.made >= level) {
                 return Ok(());
             }
-            if limit.is_over() {
+            // What was done before takes none of the time.
+            let is_out_of_time = begun.is_none() && limit.is_over();
+            if is_out_of_time {
                 observer.warning(
                     "optimizer.max_time is over before the mesh is fine enough for accuracy.tolerance: the initial design is \
                      evaluated on the mesh as it is, from which a resumed run goes on",
@@ -205,13 +207,16 @@ impl<'a> Session<'a> {
                     estimate: &errors,
                     scale: analysis.objective.map_or(f64::NAN, f64::abs),
                     evaluations: 0,
-                    is_out_of_time: limit.is_over(),
+                    is_out_of_time,
                 },
                 observer,
             );
             match refined? {
                 Refined::Yes(setup) => self.setup = *setup,
                 Refined::No | Refined::OutOf(_) => return Ok(()),
+            }
+            if begun.is_some() {
+                limit.restart();
             }
         }
     }

@@ -322,7 +322,8 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         if let Some([more, _]) =
             left_out.filter(|[more, _]| more.abs() > LEAST_LEFT_OUT * objective.best.abs())
         {
-            let what = "by impedance surfaces at sharp edges and where they are round, in no error";
+            let what =
+                "by impedance surfaces at sharp edges and where they are round; no error bar counts it";
             rows.push(("left out", format!("{more:+.1e}{} {what}", named.unit)));
         }
     }

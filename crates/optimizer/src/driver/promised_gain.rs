@@ -29,16 +29,16 @@ pub(super) fn promised_gain(sample: &Sample, design: &[f64], lower: &[f64], uppe
     room.gain(&reduced.gradient) / size(sample)
 }
 
-/// The same by the multipliers that leave the least of several: each leaves a bound on what the linear problem has, and these look at
-/// the variables alone that have room against the gradient. At an optimum that constraints and bounds hold together it is zero, where
-/// [`promised_gain`] is not.
+/// The same by the multipliers that leave the least of several, with what the slack of the constraints allows: each leaves a bound on
+/// what the linear problem has, and these look at the variables alone that have room against the gradient. At an optimum that
+/// constraints and bounds hold together it is zero, where [`promised_gain`] is not.
 pub(super) fn least_promised_gain(sample: &Sample, design: &[f64], lower: &[f64], upper: &[f64]) -> f64 {
     let room = Room { design, lower, upper };
     let mut reduced = Reduced::of(sample);
     let mut least = room.gain(&reduced.gradient);
     for _ in 0..SWEEPS {
         reduced.sweep(|k, slope| room.against(k, slope) > 0.0);
-        least = least.min(room.gain(&reduced.gradient));
+        least = least.min(room.gain(&reduced.gradient) + reduced.by_slack());
     }
     least / size(sample)
 }
@@ -70,8 +70,16 @@ impl Room<'_> {
 /// What the constraints that are active leave of a gradient: `g + Σ μ ∇c`, `μ ≥ 0`.
 struct Reduced {
     gradient: Vec<f64>,
-    /// Gradients of the active ones, with their multipliers.
-    held: Vec<(Vec<f64>, f64)>,
+    /// The active ones.
+    held: Vec<Held>,
+}
+
+/// A constraint that is active.
+struct Held {
+    gradient: Vec<f64>,
+    /// How far it is from its bound.
+    slack: f64,
+    multiplier: f64,
 }
 
 impl Reduced {
@@ -82,14 +90,21 @@ impl Reduced {
         let difference = |of: &[f64]| of.iter().zip(&gradient).map(|(own, worst)| own - worst).collect();
         let others = sample.members.iter().map(|(value, of)| (value - sample.value, difference(of)));
         let holding = sample.constraints.iter().cloned().chain(others);
-        let held = holding.filter(|(value, _)| *value > -ACTIVE).map(|(_, of)| (of, 0.0)).collect();
+        let held =
+            |(value, gradient): (f64, Vec<f64>)| Held { gradient, slack: (-value).max(0.0), multiplier: 0.0 };
+        let held = holding.filter(|(value, _)| *value > -ACTIVE).map(held).collect();
         Self { gradient, held }
+    }
+
+    /// What the linear problem gains by going up to the bounds of the constraints.
+    fn by_slack(&self) -> f64 {
+        self.held.iter().map(|own| own.multiplier * own.slack).sum()
     }
 
     /// One multiplier after the other for the least norm over the variables that have a say, by number and derivative.
     fn sweep(&mut self, has_say: impl Fn(usize, f64) -> bool) {
         let Self { gradient, held } = self;
-        for (of, multiplier) in held {
+        for Held { gradient: of, multiplier, .. } in held {
             let counted = || gradient.iter().zip(&*of).enumerate().filter(|(k, (g, _))| has_say(*k, **g));
             let along: f64 = counted().map(|(_, (g, c))| g * c).sum();
             let square: f64 = counted().map(|(_, (_, c))| c * c).sum();
@@ -137,6 +152,10 @@ mod tests {
         let least = |design: [f64; 2]| least_promised_gain(&both, &design, &lower, &upper);
         assert!(gain(&both, [0.0, 1.0]) > 0.5 && least([0.0, 1.0]) < 1e-9);
         assert!(least([0.0, 0.5]) > 0.1, "the second has room");
+        // The slack of a constraint is there to be gained: a slope of 1 up to 9e-4, over the value of ½.
+        let nearly = sample(&[-1.0, -0.5], &[(-9e-4, vec![1.0, 0.0])]);
+        let gain = least_promised_gain(&nearly, &[0.0, 1.0], &lower, &upper);
+        assert!((gain / 1.8e-3 - 1.0).abs() < 1e-9, "{gain}");
         // Two that hold it together.
         let two = [(0.0, vec![1.0, 0.0]), (0.0, vec![1.0, 1.0])];
         assert!(gain(&sample(&[-0.3, -0.2], &two), [0.0, 0.0]) < 1e-9);

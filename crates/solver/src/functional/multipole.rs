@@ -207,7 +207,10 @@ impl Multipoles {
             sampled.iter().zip(&held).find_map(|(&place, held)| {
                 // On a face either side may be meant: it must be on both.
                 let on_all = held.iter().map(|&(x, element)| matter_at(element, x)).reduce(Option::and);
-                on_all.unwrap_or(Some((place, "a hole in the mesh")))
+                on_all.unwrap_or(Some((
+                    place,
+                    "a hole in the mesh, or what is beyond an oblique plane of symmetry",
+                )))
             })
         };
         let inside = || {
