@@ -80,7 +80,7 @@ pub enum RemeshError {
         "the motion inverts element {element} of region `{region}` at {}: only {:.4} of \
          it can be taken; move less, enlarge the remesh region or change its stiffness",
         millimetres(*centroid),
-        (1e4 * fraction).floor().min(9999.0) / 1e4
+        fraction.min(0.9999)
     )]
     Inverted {
         element: ElementId,
