@@ -154,8 +154,8 @@ mod tests {
         assert!(least([0.0, 0.5]) > 0.1, "the second has room");
         // The slack of a constraint is there to be gained: a slope of 1 up to 9e-4, over the value of ½.
         let nearly = sample(&[-1.0, -0.5], &[(-9e-4, vec![1.0, 0.0])]);
-        let gain = least_promised_gain(&nearly, &[0.0, 1.0], &lower, &upper);
-        assert!((gain / 1.8e-3 - 1.0).abs() < 1e-9, "{gain}");
+        let by_slack = least_promised_gain(&nearly, &[0.0, 1.0], &lower, &upper);
+        assert!((by_slack / 1.8e-3 - 1.0).abs() < 1e-9, "{by_slack}");
         // Two that hold it together.
         let two = [(0.0, vec![1.0, 0.0]), (0.0, vec![1.0, 1.0])];
         assert!(gain(&sample(&[-0.3, -0.2], &two), [0.0, 0.0]) < 1e-9);
