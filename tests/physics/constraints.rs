@@ -157,6 +157,27 @@ fn what_is_beyond_a_bound_by_little_is_taken_a_step_back() {
     assert!(further <= kept, "{further} {kept}");
 }
 
+/// Five of six variables at their bounds, and the mass for the last: the multipliers of least norm promise a gain there, and four
+/// evaluations more were spent on rounding.
+#[test]
+fn a_search_ends_where_bounds_and_a_constraint_hold_the_design() {
+    let of_six = [("grid = [7, 13]", "grid = [3, 2]"), ("\"2.5 kg\"", "\"3 kg\"")];
+    let (run, rows) = with("shield_mass_limit.toml", &of_six, |s| Optimizer {
+        algorithm: Algorithm::Ccsaq,
+        ftol_rel: 1e-4,
+        ..s
+    });
+    let lies_at = |bound: &[f64]| run.best.values.iter().zip(bound).filter(|(p, b)| p == b).count();
+    let (problem, _) = changed("shield_mass_limit.toml", &of_six);
+    let shape = problem.shape().expect("a design");
+    let held = lies_at(shape.lower()) + lies_at(shape.upper());
+    println!("{:?} after {} evaluations", run.stop_reason, rows.len());
+    assert_eq!(held, 5, "{:?}", run.best.values);
+    let reached =
+        rows.iter().position(|row| row.objective < run.best.objective * (1.0 + 1e-6)).expect("the best");
+    assert!(run.stop_reason == StopReason::ObjectiveConverged && rows.len() - reached <= 2, "{reached}");
+}
+
 #[test]
 fn a_design_that_starts_outside_is_led_inside() {
     // The flat plate has 2.26 kg.

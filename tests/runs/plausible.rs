@@ -445,12 +445,11 @@ fn surfaces_that_move_otherwise_than_they_are_said_to_are_asked_about() {
     assert!(slid.contains("`plate_bottom` in remesh.slide is a design surface"), "{slid}");
     let said = "`remesh|air` in remesh.free is a face of `air` beyond what moves: its elements there are dragged along";
     assert!(check(&["remesh.free=[\"remesh|air\"]"]).contains(said));
-    // The other side of the plate moves too.
-    let free = [&MESHED[..], &["remesh.free=[\"plate_top\"]"]].concat();
-    let found = check(&free);
-    assert!(
-        !found.contains("dragged along") && found.contains("`plate_top` in remesh.free has faces across")
-    );
+    // The other side of the plate moves too, unless it is held.
+    let of = |more: &[&str]| check(&[&MESHED[..], &["remesh.free=[\"plate|remesh\"]"], more].concat());
+    let said = "`plate|remesh` in remesh.free has faces across";
+    assert!(of(&[]).contains(said) && !of(&[]).contains("dragged along"));
+    assert!(!of(&["remesh.fixed=[\"plate_top\"]"]).contains(said));
 }
 
 /// What is as light as it can be is at its bounds, unless the field has to do something.
