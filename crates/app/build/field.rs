@@ -375,8 +375,9 @@ pub(super) fn coil_notices(model: &FieldModel) -> Vec<String> {
             let is_smooth = report.after.jump.max(report.after.wall) < LEAST_DIVERGENCE;
             let is_branched = report.correction > BRANCHED;
             let meaning = if is_branched {
-                "the region branches, or its cross-section changes along the way, and strands of one current density do not fit it: \
-                 give each winding a region of its own, or set conductor = \"solid\" where currents may part"
+                "the region branches, or its cross-section changes along the way, and strands of one current density do not fit it: its \
+                 current runs back in parts of it, and inductances may be off by tenths, which no error bar counts. Give each \
+                 winding a region of its own and one cross-section, or set conductor = \"solid\" where currents may part"
             } else {
                 "where the winding bends its current is off from element to element, and as a whole nearer to the inside: fields, \
                  inductances, losses and forces that it makes in air are off by about a tenth of that, which no error bar counts, \

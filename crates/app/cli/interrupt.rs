@@ -1,12 +1,14 @@
 //! Signals: the first asks the command to end after the current work, the second ends the process at once.
 //!
 //! METIS replaces the handler of SIGTERM during its calls by one of its own, which jumps to where the thread that called METIS began,
-//! whichever thread it runs in. So no thread of this program takes SIGTERM: all block it, and one waits for it. Libraries that
-//! start threads before `main` do, as OpenBLAS of builds with PETSc; for these there is a handler as well. The threads that
+//! whichever thread it runs in. So no thread takes SIGTERM: all block it, and one waits for it. Where a library has started threads
+//! before `main`, as OpenBLAS of builds with PETSc does, the program begins once more: what is blocked stays so. The threads that
 //! wait have nothing else to do, so that the second signal needs no help of one that may be busy. The files of a run bear
 //! its end at any moment.
 
+use std::ffi::{CString, OsString};
 use std::io::Write;
+use std::os::unix::ffi::OsStringExt;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, OnceLock};
 
@@ -79,8 +81,12 @@ static WATCHED: OnceLock<Watched> = OnceLock::new();
 /// command watches for signals it ends the process. Where the system refuses, its default (ending at once) stays.
 pub(super) fn wait_for_termination() {
     let termination: SigSet = [Number::SIGTERM].into_iter().collect();
+    let was_blocked = SigSet::thread_get_mask().is_ok_and(|mask| mask.contains(Number::SIGTERM));
     if termination.thread_block().is_err() {
         return;
+    }
+    if !was_blocked && has_other_threads() {
+        begin_once_more();
     }
     let waiting = std::thread::Builder::new().name(WAITING.to_owned()).spawn(move || {
         while termination.wait().is_ok() {
@@ -89,6 +95,22 @@ pub(super) fn wait_for_termination() {
     });
     if waiting.is_err() {
         let _ = termination.thread_unblock();
+    }
+}
+
+/// Whether there are threads beside this one, as far as the system says.
+fn has_other_threads() -> bool {
+    std::fs::read_dir("/proc/self/task").is_ok_and(|threads| threads.count() > 1)
+}
+
+/// Takes the place of this process by another one of the same program and arguments, which has its signal mask; returns where that
+/// cannot be.
+fn begin_once_more() {
+    let text = |text: OsString| CString::new(text.into_vec()).ok();
+    let program = std::env::current_exe().ok().and_then(|path| text(path.into_os_string()));
+    let arguments: Option<Vec<CString>> = std::env::args_os().map(text).collect();
+    if let (Some(program), Some(arguments)) = (program, arguments) {
+        let _ = nix::unistd::execv(&program, &arguments);
     }
 }
 

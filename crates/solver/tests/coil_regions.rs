@@ -227,6 +227,23 @@ fn two_parts_in_series_each_carry_the_whole_current() {
     assert_eq!(found, RegionFault::SeveralRings { parts: 2 });
 }
 
+/// Nothing passes along a line from strand to strand; with common nodes the two would be in parallel.
+#[test]
+fn parts_that_touch_along_a_line_are_in_series() {
+    let mesh = warped([0.02, 0.1, 0.02], [2, 4, 2], |x| x);
+    let is_low = |x: f64| x < 0.01;
+    let of_diagonal = |e: &ElementId| {
+        let c = tet4::centroid(mesh.vertices(*e));
+        is_low(c[0]) == is_low(c[2])
+    };
+    let kept: Vec<_> = mesh.topology().elements().filter(of_diagonal).collect();
+    let path = Path::Terminals { from: terminal(&mesh, "y_min"), to: terminal(&mesh, "y_max") };
+    let current = RegionCurrent::new(&mesh, "winding", &kept, &path).expect("two bars");
+    for (_, j) in current.current_density() {
+        assert!((j[1] * 0.01 * 0.01 - 1.0).abs() < 1e-11, "{j:?}");
+    }
+}
+
 #[test]
 fn a_path_that_is_none_is_refused() {
     let bar = warped([0.02, 0.1, 0.03], [2, 3, 2], |x| x);

@@ -137,7 +137,8 @@ table! {
         inner_radius: Option<f64> = length(POSITIVE);
         /// With `region`: the surface where the current comes in, and the one where it goes out; both flux-parallel. Only
         /// triangles that are faces of the region count, so they may be whole symmetry planes. Separate parts of the region are
-        /// in series: each carries all ampere-turns.
+        /// in series: each carries all ampere-turns. Parts of strands that touch in nodes or along a line are separate, those with a common
+        /// face are one.
         terminals: Option<[String; 2]> =
             two_names("two surfaces: where the current comes in, where it goes out");
     }

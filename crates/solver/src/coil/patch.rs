@@ -1,4 +1,5 @@
-//! The elements of a coil region on their own: local node numbers, faces and separate parts.
+//! The elements of a coil region on their own: local node numbers, faces and separate parts. What makes parts separate is said by
+//! [`Contact`].
 
 use std::collections::HashMap;
 
@@ -37,38 +38,60 @@ pub(super) struct Patch {
     pub(super) part_of: Vec<usize>,
     /// Separate parts.
     pub(super) parts: usize,
-    local_of: HashMap<NodeId, NodeId>,
+    /// The node of the mesh of every local node.
+    mesh_nodes: Vec<NodeId>,
+}
+
+/// What joins elements to one part. Nodes that several parts have are local nodes of each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Contact {
+    /// A node: all that touches conducts.
+    Node,
+    /// A face: strands do not pass along a line.
+    Face,
 }
 
 impl Patch {
-    pub(super) fn new(mesh: &Mesh, elements: &[ElementId]) -> Self {
+    pub(super) fn new(mesh: &Mesh, elements: &[ElementId], contact: Contact) -> Self {
         let topology = mesh.topology();
         let mut elements = elements.to_vec();
         elements.sort_unstable();
         elements.dedup();
-        let mut nodes: Vec<NodeId> = elements.iter().flat_map(|&e| topology.tet(e)).collect();
+        let faces = faces(mesh, &elements);
+        let tets: Vec<[NodeId; 4]> = elements.iter().map(|&e| topology.tet(e)).collect();
+        let joined = joined(&tets, &faces, contact);
+        // A node of each part that has it.
+        let mut nodes: Vec<(NodeId, usize)> =
+            tets.iter().zip(&joined).flat_map(|(tet, part)| tet.map(|n| (n, *part))).collect();
         nodes.sort_unstable();
         nodes.dedup();
-        let local_of: HashMap<NodeId, NodeId> =
-            nodes.iter().enumerate().map(|(i, &n)| (n, NodeId::new(i))).collect();
-        let connectivity: Vec<[NodeId; 4]> =
-            elements.iter().map(|&e| topology.tet(e).map(|n| local_of[&n])).collect();
-        let (part_of, parts) = parts(nodes.len(), &connectivity);
+        let local = |node| NodeId::new(nodes.binary_search(&node).expect("it is among them"));
+        let connectivity =
+            tets.iter().zip(&joined).map(|(tet, part)| tet.map(|n| local((n, *part)))).collect();
+        let mut numbers: HashMap<usize, usize> = HashMap::new();
+        let number = |(_, part): &(NodeId, usize)| {
+            let next = numbers.len();
+            *numbers.entry(*part).or_insert(next)
+        };
+        let part_of = nodes.iter().map(number).collect();
         Self {
             tets: elements.iter().map(|&e| Tet4::new(mesh.vertices(e))).collect(),
-            faces: faces(mesh, &elements),
-            points: nodes.iter().map(|&n| mesh.point(n)).collect(),
+            points: nodes.iter().map(|(n, _)| mesh.point(*n)).collect(),
+            faces,
             elements,
             connectivity,
             part_of,
-            parts,
-            local_of,
+            parts: numbers.len(),
+            mesh_nodes: nodes.into_iter().map(|(n, _)| n).collect(),
         }
     }
 
-    /// The local node of a node of the mesh.
-    pub(super) fn local(&self, node: NodeId) -> Option<NodeId> {
-        self.local_of.get(&node).copied()
+    /// The local nodes of a face by its nodes in the mesh, ascending, in the element that its area vector points out of.
+    pub(super) fn face(&self, key: [NodeId; 3]) -> Option<[NodeId; 3]> {
+        let found = self.faces.binary_search_by_key(&key, |face| face.key).ok()?;
+        let of_element = self.connectivity[self.faces[found].inside];
+        let local = |node: NodeId| of_element.into_iter().find(|n| self.mesh_nodes[n.index()] == node);
+        Some([local(key[0])?, local(key[1])?, local(key[2])?])
     }
 
     /// The part of an element, by position.
@@ -152,22 +175,22 @@ fn faces(mesh: &Mesh, elements: &[ElementId]) -> Vec<PatchFace> {
         .collect()
 }
 
-/// Which nodes hang together through elements.
-fn parts(node_count: usize, connectivity: &[[NodeId; 4]]) -> (Vec<usize>, usize) {
-    let mut sets = DisjointSets::new(node_count);
-    connectivity.iter().for_each(|nodes| sets.join(nodes.map(NodeId::index)));
-    let mut number = vec![0; node_count];
-    let mut count = 0;
-    for i in 0..node_count {
-        let r = sets.root(i);
-        if r == i {
-            number[i] = count;
-            count += 1;
-        } else {
-            number[i] = number[r];
+/// Which elements are joined: of each the first one of its part.
+fn joined(tets: &[[NodeId; 4]], faces: &[PatchFace], contact: Contact) -> Vec<usize> {
+    let mut sets = DisjointSets::new(tets.len());
+    match contact {
+        Contact::Face => {
+            let pairs = faces.iter().filter_map(|face| Some([face.inside, face.outside?]));
+            pairs.for_each(|pair| sets.join(pair));
+        }
+        Contact::Node => {
+            let mut first: HashMap<NodeId, usize> = HashMap::new();
+            for (e, tet) in tets.iter().enumerate() {
+                tet.iter().for_each(|n| sets.join([*first.entry(*n).or_insert(e), e]));
+            }
         }
     }
-    (number, count)
+    (0..tets.len()).map(|e| sets.root(e)).collect()
 }
 
 /// `u/|u|`, zero where `u` is below `least`.

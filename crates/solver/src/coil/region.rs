@@ -23,7 +23,7 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use super::divergence::{CurrentReport, Section, report};
 use super::fault::RegionFault;
 use super::frame::Frame;
-use super::patch::{Patch, direction};
+use super::patch::{Contact, Patch, direction};
 use super::potential::Potential;
 use crate::error::SolverError;
 
@@ -39,7 +39,7 @@ pub struct Terminal {
 /// The way of the current through a region.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Path {
-    /// Between two terminals. Several separate parts are in series: each carries the whole current.
+    /// Between two terminals. Several separate parts, which have no face in common, are in series: each carries the whole current.
     Terminals {
         /// Where positive current comes in.
         from: Terminal,
@@ -99,7 +99,7 @@ impl RegionCurrent {
         if elements.is_empty() {
             return Err(refuse(RegionFault::NoElements));
         }
-        let patch = Patch::new(mesh, elements);
+        let patch = Patch::new(mesh, elements, Contact::Face);
         match path {
             Path::Terminals { from, to } => {
                 let terminals = terminal_faces(&patch, from, to).map_err(refuse)?;
@@ -273,7 +273,7 @@ pub(super) fn terminal_values(
     let mut values: Vec<Option<f64>> = vec![None; patch.points.len()];
     let mut reached = vec![[false; 2]; patch.parts];
     for face in faces {
-        for node in face.nodes.iter().filter_map(|n| patch.local(*n)) {
+        for node in patch.face(face.nodes).into_iter().flatten() {
             let value = match face.end {
                 End::From => 1.0,
                 End::To => 0.0,

@@ -17,7 +17,7 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 use super::conduction;
 use super::divergence::Section;
 use super::fault::RegionFault;
-use super::patch::Patch;
+use super::patch::{Contact, Patch};
 use super::potential::Potential;
 use super::region::{self, NO_RING, Path, RegionCurrent};
 use crate::elements::Order;
@@ -71,7 +71,7 @@ impl SolidConductor {
         if elements.is_empty() {
             return Err(refuse(RegionFault::NoElements));
         }
-        let patch = Patch::new(mesh, elements);
+        let patch = Patch::new(mesh, elements, Contact::Node);
         match path {
             Path::Terminals { from, to } => {
                 let terminals = region::terminal_faces(&patch, from, to).map_err(refuse)?;
