@@ -203,8 +203,8 @@ fn slid_warning(remesh: &Remesh, design: &Design) -> Vec<String> {
     designed.map(text).collect()
 }
 
-/// Faces in `remesh.free` that lie across the motion of the design, such as the far side of a plate: they follow it, so that its
-/// thickness is not what the variables say.
+/// Faces in `remesh.free` that lie across the motion of the design and are not named to stay, such as the far side of a plate: they
+/// follow it, so that its thickness is not what the variables say.
 fn opposite_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
     let directions = surface.directions().iter().filter(|d| norm(**d) > 0.0);
     let Some(along) = directions.clone().next() else { return Vec::new() };

@@ -144,6 +144,7 @@ pub(super) fn watch(message: &'static str) -> Signal {
     let watched = WATCHED.get_or_init(|| Watched { number, message });
     // `mpirun` hands SIGUSR1 on to its ranks, and kills them soon after anything else.
     let of_launcher = launcher::is_launched().then_some(SIGUSR1);
+    // SIGTERM for threads that do not block it, where the system does not show or replace them.
     if let Ok(mut signals) = Signals::new([SIGINT, SIGTERM].into_iter().chain(of_launcher)) {
         std::thread::spawn(move || signals.forever().for_each(arrive));
     }

@@ -96,8 +96,7 @@ impl LeftOut {
         let of_state = |(model, solution): (&FieldModel, &FieldSolution)| {
             let found = excess_losses(model, &analysis.mesh, solution).into_iter();
             let losses = found.map(|own| (own.region.clone(), own.more())).collect();
-            let of_coils = (currents(model, solution), powers(model, &analysis.mesh, solution));
-            let coil = match (&of_coils.0[..], &of_coils.1[..]) {
+            let coil = match (&currents(model, solution)[..], &powers(model, &analysis.mesh, solution)[..]) {
                 ([(_, current)], [(_, power)]) if model.coils().len() == 1 => {
                     Some(OneCoil { current: current.norm(), power: *power })
                 }

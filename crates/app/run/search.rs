@@ -182,7 +182,7 @@ impl<'a> Session<'a> {
             if begun.is_some_and(|level| levels.made >= level) {
                 return Ok(());
             }
-            // What was done before takes none of the time.
+            // What was done before takes none of the time, which begins when all is replayed.
             let is_out_of_time = begun.is_none() && limit.is_over();
             if is_out_of_time {
                 observer.warning(
@@ -214,9 +214,6 @@ impl<'a> Session<'a> {
             match refined? {
                 Refined::Yes(setup) => self.setup = *setup,
                 Refined::No | Refined::OutOf(_) => return Ok(()),
-            }
-            if begun.is_some() {
-                limit.restart();
             }
         }
     }

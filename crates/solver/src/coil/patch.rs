@@ -86,12 +86,15 @@ impl Patch {
         }
     }
 
-    /// The local nodes of a face by its nodes in the mesh, ascending, in the element that its area vector points out of.
-    pub(super) fn face(&self, key: [NodeId; 3]) -> Option<[NodeId; 3]> {
-        let found = self.faces.binary_search_by_key(&key, |face| face.key).ok()?;
-        let of_element = self.connectivity[self.faces[found].inside];
-        let local = |node: NodeId| of_element.into_iter().find(|n| self.mesh_nodes[n.index()] == node);
-        Some([local(key[0])?, local(key[1])?, local(key[2])?])
+    /// A face by its nodes in the mesh, ascending.
+    pub(super) fn face(&self, key: &[NodeId; 3]) -> Option<&PatchFace> {
+        self.faces.binary_search_by_key(key, |face| face.key).ok().map(|i| &self.faces[i])
+    }
+
+    /// The local nodes of a face, in the element that its area vector points out of.
+    pub(super) fn nodes_of(&self, face: &PatchFace) -> impl Iterator<Item = NodeId> {
+        let is_of_face = |n: &NodeId| face.key.contains(&self.mesh_nodes[n.index()]);
+        self.connectivity[face.inside].into_iter().filter(is_of_face)
     }
 
     /// The part of an element, by position.

@@ -205,7 +205,7 @@ fn stranded_current(
     let smoothed = patch.smoothed(conduction);
     let uniform = |(h, smoothed): (&Point, &Point)| {
         let (own, around) = (direction(*h, least), direction(*smoothed, least));
-        // Where parts touch that carry the current to and fro, the mean is neither's.
+        // Where a winding touches itself, the mean is neither leg's.
         if dot(own, around) > LEAST_COSINE { around } else { own }
     };
     let uniform: Vec<Point> = conduction.iter().zip(&smoothed).map(uniform).collect();
@@ -249,10 +249,7 @@ pub(super) fn terminal_faces(
             .iter()
             .copied()
             .map(face_key)
-            .filter(|key| {
-                let found = patch.faces.binary_search_by_key(key, |f| f.key);
-                found.is_ok_and(|i| patch.faces[i].outside.is_none())
-            })
+            .filter(|key| patch.face(key).is_some_and(|face| face.outside.is_none()))
             .collect();
         nodes.sort_unstable();
         nodes.dedup();
@@ -273,7 +270,7 @@ pub(super) fn terminal_values(
     let mut values: Vec<Option<f64>> = vec![None; patch.points.len()];
     let mut reached = vec![[false; 2]; patch.parts];
     for face in faces {
-        for node in patch.face(face.nodes).into_iter().flatten() {
+        for node in patch.face(&face.nodes).into_iter().flat_map(|face| patch.nodes_of(face)) {
             let value = match face.end {
                 End::From => 1.0,
                 End::To => 0.0,
