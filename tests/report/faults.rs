@@ -25,6 +25,27 @@ fn what_is_no_run_or_analysis_is_refused() {
 }
 
 #[test]
+fn a_page_takes_the_place_of_a_page_alone() {
+    let home = folder();
+    let out = block("run", home.path(), &[]);
+    let (notes, page) = (home.path().join("notes.txt"), home.path().join("page.html"));
+    std::fs::write(&notes, "mine").expect("written");
+    let journal = out.join("journal.jsonl");
+    let whole = std::fs::read(&journal).expect("a journal");
+    for other in [&notes, &journal] {
+        fluxmorph(&[&"report", &out, &"--out", other]).with(5, &["is no page of fluxmorph", "--out"]);
+    }
+    assert_eq!(std::fs::read(&journal).expect("it is there"), whole);
+    assert_eq!(read_text(&notes), "mine");
+    for _ in 0..2 {
+        fluxmorph(&[&"report", &out, &"--out", &page]).with(0, &["page.html"]);
+    }
+    // Without its mark a directory is none of a run, and the file is named that is missing.
+    std::fs::remove_file(out.join("manifest.json")).expect("it is there");
+    report_fails(&out, 5, &["manifest.json` is missing, the mark of a run", "restore it"]);
+}
+
+#[test]
 fn a_damaged_file_is_named_and_the_older_page_stays() {
     let home = folder();
     let out = block("run", home.path(), &[]);

@@ -165,6 +165,23 @@ fn a_run_of_short_evaluations_keeps_the_fields_of_all_that_were_done() {
     }
 }
 
+#[test]
+fn evaluations_that_another_program_removes_are_not_said_to_be_saved() {
+    let home = folder();
+    let out = home.path().join("out");
+    let mut run = Timed::start(&mut endless().command("run", &out));
+    wait_until("the first evaluation", || rows(&out) > 0);
+    std::fs::remove_file(out.join(JOURNAL)).expect("it is there");
+    run.answer("INT");
+    let (code, said) = run.end();
+    assert_eq!(code, Some(130), "{said}");
+    assert!(
+        said.contains("journal.jsonl holds 0 of ") && said.contains("computes the others anew"),
+        "{said}"
+    );
+    assert!(!said.contains("all evaluations are saved"), "{said}");
+}
+
 /// Two signals to a command on a device of long evaluations once a file is there; the directory that it left without a
 /// result.
 fn left_at_once(device: &Device, name: &str, begun: &str, home: &Path) -> std::path::PathBuf {

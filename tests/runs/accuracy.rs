@@ -31,7 +31,7 @@ fn a_gain_of_the_mesh_is_not_confirmed_and_one_of_the_shape_is() {
     assert_eq!(result["accuracy"]["cross_check"]["elements"], "edge");
     assert_eq!(result["accuracy"]["cross_check"]["by_estimate"], false);
     let edge = home.path().join("edge");
-    pole(&["analysis.elements=edge", "analysis.order=1"], &edge).says(&[
+    pole(&["analysis.elements=edge", "analysis.order=1", "mesh.boxes.refinement=0.75"], &edge).says(&[
         "error bar of F/F0",
         "(edge, order 2, by the estimate)",
         "confirmed: the gain is the shape's",
@@ -341,7 +341,8 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
                     box = [[\"0 mm\", \"0 mm\", \"24 mm\"], [\"8 mm\", \"8 mm\", \"36 mm\"]]\n\
                     size = [\"4 mm\", \"4 mm\", \"4 mm\"]\n\n[[mesh.boxes.surfaces]]";
     let driven = ("ampere_turns = \"20 A\"", "voltage = \"0.1 V\"");
-    let device = changed(device, &[("[[mesh.boxes.surfaces]]", aperture), frequencies, driven]);
+    let coarser = ("growth = 2", "growth = 2\nrefinement = 0.75");
+    let device = changed(device, &[("[[mesh.boxes.surfaces]]", aperture), coarser, frequencies, driven]);
     let more = "[[probes]]\nname = \"axis\"\npoints = [[\"0 mm\", \"0 mm\", \"30 mm\"], [\"5 mm\", \"0 mm\", \"10 mm\"]]\n\n\
                 [[forces]]\nname = \"plate\"\nregions = [\"plate\"]\n";
     let path = home.path().join("coils.toml");

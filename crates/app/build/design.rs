@@ -53,11 +53,7 @@ pub(super) fn surface(
             (None, Some(radius)) => Control::Filter(radius),
             (None, None) => Control::Filter(default_filter_radius(mesh, &triangles)),
         },
-        mirrors: design
-            .symmetry
-            .iter()
-            .map(|plane| Mirror { axis: plane.axis.index(), at: plane.at })
-            .collect(),
+        mirrors: mirrors(design),
         boundary: match design.rim {
             RimMotion::Free => BoundaryMotion::Free,
             RimMotion::Fixed => BoundaryMotion::Fixed,
@@ -86,6 +82,11 @@ fn kept_surfaces(config: &Config) -> BTreeSet<&String> {
 /// The triangles of the design surface, each once, on the mesh with all regions.
 pub(crate) fn triangulation(design: &config::Design, mesh: &Mesh) -> Result<Triangulation, Error> {
     Ok(Triangulation::new(mesh, &triangles(design, mesh)?))
+}
+
+/// The planes of symmetry.
+pub(super) fn mirrors(design: &config::Design) -> Vec<Mirror> {
+    design.symmetry.iter().map(|plane| Mirror { axis: plane.axis.index(), at: plane.at }).collect()
 }
 
 /// The triangles themselves.

@@ -114,7 +114,14 @@ pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) 
         let place = millimetres(place);
         let message = format!("the {shape} of the expansion `{}` holds {what}, at {place}", set.name);
         let fault = source.diagnostic(&format!("multipoles[{k}].radius"), message);
-        sink.push(fault.expected(expected).help("take a smaller radius, or another center"));
+        let help = match what {
+            Multipoles::NOWHERE => {
+                "take a smaller radius, another center, or a model that ends in planes of constant coordinate alone: an expansion has \
+                 images in these"
+            }
+            _ => "take a smaller radius, or another center",
+        };
+        sink.push(fault.expected(expected).help(help));
     }
     sink.check()
 }

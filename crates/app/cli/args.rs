@@ -404,7 +404,11 @@ fn duration(text: &str) -> Result<f64, String> {
         Ok(seconds) => seconds,
         Err(_) => parse_quantity(text, Dimension::Duration).map_err(|error| error.to_string())?,
     };
-    if value > 0.0 && value.is_finite() { Ok(value) } else { Err("must be longer than 0 s".to_owned()) }
+    match value {
+        value if value > 0.0 && value.is_finite() => Ok(value),
+        value if value <= 0.0 => Err("must be longer than 0 s".to_owned()),
+        _ => Err("must be a finite time".to_owned()),
+    }
 }
 
 fn key_value(text: &str) -> Result<String, String> {

@@ -12,6 +12,7 @@ use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{RunDirectory, RunStatus, StopReason, extend_command, resume_command, system_disk};
+use crate::run::journal::Journal;
 use crate::run::{self, Concluded, Options, RunLimits, SavedRun};
 use crate::show::RunObserver;
 use crate::show::report::ReportedRun;
@@ -82,6 +83,15 @@ fn conclude(
     let directory = ended.directory;
     // Whoever reads standard output may have no room for it: what belongs into the directory comes there all the same.
     let printed = if ended.json { stdout::print_json(&result) } else { Ok(()) };
+    let saved = Journal::read_records(&held).map_or(0, |records| records.len());
+    let is_saved = saved >= result.evaluations;
+    if !is_saved {
+        observer.warning(&format!(
+            "journal.jsonl holds {saved} of {} evaluations: it was removed or changed while the run went on, and `resume` computes \
+             the others anew",
+            result.evaluations
+        ));
+    }
     if ended.report {
         // The result is worth more than a page about it: not even a bug in the page changes how the run ends.
         match page(held) {
@@ -94,8 +104,8 @@ fn conclude(
     let interrupted = result.status == RunStatus::Interrupted;
     match result.stop_reason {
         reason if interrupted || reason == StopReason::MaxTime => {
-            observer
-                .warning(&format!("all evaluations are saved: resume with `{}`", resume_command(directory)));
+            let what = if is_saved { "all evaluations are saved: " } else { "" };
+            observer.warning(&format!("{what}resume with `{}`", resume_command(directory)));
         }
         StopReason::MaxEvaluations => {
             observer.note(&format!("to continue: {}", extend_command(directory, result.evaluations)))

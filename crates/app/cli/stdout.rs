@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Write};
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::files::OutputError;
+use crate::files::{OutputError, STDOUT};
 use crate::printable::{printable, printable_json};
 
 /// Print a text; letters in it that would act on a terminal are written out.
@@ -19,7 +19,7 @@ fn write(text: &str) -> Result<(), Error> {
     let mut stdout = std::io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(OutputError::io("write to", "standard output")(error).into())
+            Err(OutputError::io("write to", STDOUT)(error).into())
         }
         _ => Ok(()),
     }

@@ -79,6 +79,17 @@ pub enum OutputError {
         "`{path}` holds no run of fluxmorph: expected a directory that `fluxmorph run` has written into; of a sweep, one of those in it"
     )]
     NoRun { path: PathBuf },
+    /// What a run has left is in a directory, but not its mark.
+    #[error(
+        "`{path}` is missing, the mark of a run, whose other files are beside it: restore it from a copy; without it nothing here is \
+         taken for a run, and nothing is replaced"
+    )]
+    NoManifest { path: PathBuf },
+    /// A page would take the place of something else.
+    #[error(
+        "`{path}` is there and is no page of fluxmorph; nothing in it was touched: name another file with --out, or remove it"
+    )]
+    NoPage { path: PathBuf },
     /// Another process writes into the directory.
     #[error(
         "`{path}` is written by another process of fluxmorph: wait for it or stop it; a new run may write elsewhere with \
@@ -108,14 +119,23 @@ pub enum OutputError {
     )]
     OlderJournal { path: PathBuf, version: String },
     /// The operating system refused.
-    #[error("cannot {action} `{path}`: {source}; {}", advice(.source))]
+    #[error("cannot {action} `{path}`: {source}; {}", advice(action, path, .source))]
     Io { action: &'static str, path: PathBuf, source: std::io::Error },
 }
 
+/// The path of what has none.
+pub(crate) const STDOUT: &str = "standard output";
+
 /// What to do about an error of the operating system.
-fn advice(error: &std::io::Error) -> &'static str {
+fn advice(action: &str, path: &Path, error: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
     match error.kind() {
+        ErrorKind::PermissionDenied if action == "read" => {
+            "whoever runs fluxmorph must be allowed to read it"
+        }
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded if path == Path::new(STDOUT) => {
+            "free some space where it leads"
+        }
         ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => {
             "choose a directory you may write to, for a new run with --out"
         }

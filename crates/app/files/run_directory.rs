@@ -51,6 +51,11 @@ fn is_of_run(name: &str) -> bool {
     FILES.contains(&name) || is_case(name)
 }
 
+/// Whether an error says that a file is named where a directory is meant.
+fn is_no_directory(error: &OutputError) -> bool {
+    matches!(error, OutputError::Io { source, .. } if source.kind() == io::ErrorKind::NotADirectory)
+}
+
 impl RunDirectory {
     /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
     ///
@@ -169,6 +174,14 @@ impl RunDirectory {
             Err(damaged @ OutputError::Damaged { .. }) if !Manifest::is_of_another(&directory) => {
                 return Err(damaged);
             }
+            Err(OutputError::Io { source, .. }) if source.kind() == io::ErrorKind::NotFound => {
+                let of_run = [directory.config(), directory.journal()];
+                return Err(match of_run.iter().all(|file| directory.holds(file)) {
+                    true => OutputError::NoManifest { path: directory.manifest() },
+                    false => OutputError::NoRun { path: path.to_owned() },
+                });
+            }
+            Err(error @ OutputError::Io { .. }) if !is_no_directory(&error) => return Err(error),
             _ => return Err(OutputError::NoRun { path: path.to_owned() }),
         }
         directory.refuse_link()?;

@@ -243,8 +243,8 @@ impl Session<'_> {
                 ElementOrder::Quadratic => "refine the mesh",
             };
             observer.warning(&format!(
-                "the gain of this run is not confirmed: less than half of it is left on another mesh, by other elements, \
-                 without the estimated errors, with its facets on their surfaces or with what impedance surfaces leave out; {cure}, with \
+                "the gain of this run is not confirmed: less than half of F/F0 - 1, or a quarter of F - F0, is left on another \
+                 mesh, by other elements, without the estimated errors, with its facets on their surfaces or with what impedance surfaces leave out; {cure}, with \
                  smaller faces where they are curved"
             ));
         }

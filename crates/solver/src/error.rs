@@ -125,7 +125,7 @@ pub enum SolverError {
     /// The layer around a body on which a force is sought is not free.
     #[error(
         "the force on `{body}` is taken in the layer of elements around it, which meets {what} in `{region}` at {}: \
-         a body needs a layer of air around it; add what it touches to its regions",
+         a body needs a layer of air around it; make it finer there, or add what it touches to its regions",
         millimetres(*place)
     )]
     Layer {

@@ -14,7 +14,7 @@ use fluxmorph_geometry::{ElementId, Mesh};
 use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::line_search::{self, Along};
-use crate::linear::{Goal, LinearSolverReport, PreparedSystem};
+use crate::linear::{Goal, Left, LinearSolverReport, PreparedSystem};
 use crate::model::FieldModel;
 use crate::newton_steps::{Descent, MOST_STEPS, StepSystems, Verdict, failure};
 use crate::nonlinear::{self, Added};
@@ -191,7 +191,10 @@ pub(crate) fn solve(
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on { problem.search(&iterate, &step) } else { None };
         let Some((next, length)) = found else {
-            if systems.is_least(residual, system.method()) {
+            let (method, solution) = (system.method(), iterate.solution.values());
+            let left =
+                |matrix| Left { matrix, load: &problem.load, solution, residual: &right_side, step: &step };
+            if systems.is_least(residual, method) || systems.is_rounding(method, system.matrix().map(left)) {
                 return Ok((iterate.into_state(LinearSolverReport { iterations, residual }, steps), system));
             }
             systems.keep(system.into_field());

@@ -18,7 +18,7 @@ use crate::element::tensor::MOST_POINTS;
 use crate::error::{NonConvergence, SolverError};
 use crate::line_search;
 use crate::linear::gmres::{self, Ended};
-use crate::linear::{FieldSystem, LinearSolverReport, PreparedSystem, RealLinear};
+use crate::linear::{FieldSystem, Left, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
 use crate::newton::{self, NewtonObserver, NewtonProgress};
 use crate::newton_steps::{Descent, MOST_STEPS, StepSystems, Verdict};
@@ -118,6 +118,20 @@ impl HarmonicTangent {
         Ok((x, LinearSolverReport { iterations: inner, residual }))
     }
 
+    /// Whether what an adjoint solution leaves is rounding.
+    fn is_rounding(
+        &self,
+        (load, solution): (&[c64], &[c64]),
+        nearest: &mut FieldSystem,
+    ) -> Result<bool, SolverError> {
+        let mut residual = load.to_vec();
+        axpy(c64::from(-1.0), &self.apply(Side::Adjoint, solution), &mut residual);
+        let (step, _) = nearest.solve_once(&residual)?;
+        let required = self.model.setup().linear_solver.required;
+        let left = |matrix| Left { matrix, load, solution, residual: &residual, step: &step };
+        Ok(nearest.matrix().map(left).is_some_and(|left| left.is_rounding(required)))
+    }
+
     /// The tensors of the complex symmetric matrix that is nearest.
     fn tensors(&self) -> Tangents {
         let of = |points: &[Option<PointLaw>; MOST_POINTS]| {
@@ -136,7 +150,7 @@ impl RealLinear for HarmonicTangent {
         let settings = &self.model.setup().linear_solver;
         let (x, report) = self.invert(Side::Adjoint, right_side, nearest, settings.tolerance)?;
         let LinearSolverReport { residual, iterations } = report;
-        if residual <= settings.required {
+        if residual <= settings.required || self.is_rounding((right_side, &x), nearest)? {
             return Ok((x, report));
         }
         let (required, cause) = (settings.required, NonConvergence::IllConditioned);
@@ -319,13 +333,23 @@ pub(crate) fn solve(
         let (step, report) = tangent.invert(Side::State, &right_side, &mut field, tolerance)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on { problem.search(&iterate, &step, &mut field)? } else { None };
-        systems.keep(field);
         let Some((next, length)) = found else {
+            let (load, solution) = (&problem.load[..], &iterate.values[..]);
+            let left = |matrix| Left { matrix, load, solution, residual: &right_side, step: &step };
+            let is_state = systems.is_rounding(field.method(), field.matrix().map(left));
+            systems.keep(field);
+            if is_state {
+                let nearest = model.with_tangents(&problem.matrix, &tangent.tensors(), mesh);
+                let report = LinearSolverReport { iterations, residual };
+                let state = FieldSolution::state(iterate.values, report).after_newton(steps);
+                return Ok((state, systems.prepare(nearest)?.with_tangent(tangent)));
+            }
             let mut values = iterate.values.clone();
             axpy(c64::from(1.0), &step, &mut values);
             let [from, to] = [iterate.values, values].map(FieldSolution::of_state);
             return Err(newton::refused(model, mesh, (steps, residual), &from, &to));
         };
+        systems.keep(field);
         iterations += report.iterations;
         (steps, damping, iterate) = (steps + 1, length, next);
     }

@@ -9,7 +9,7 @@
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 
 use crate::error::{NewtonFailure, SolverError};
-use crate::linear::{FieldSystem, LinearSolverCache, Method, PreparedSystem, SolverEvent};
+use crate::linear::{FieldSystem, Left, LinearSolverCache, Method, PreparedSystem, SolverEvent};
 use crate::model::FieldModel;
 
 /// Steps after which there is no hope: five to fifteen are usual.
@@ -121,6 +121,12 @@ impl<'a> StepSystems<'a> {
     /// Whether a residual that stays is as small as there is any, where the steps were solved by this method.
     pub(crate) fn is_least(&self, residual: f64, method: Option<Method>) -> bool {
         residual <= REQUIRED || residual <= REQUIRED_AT_LAST && self.more_robust(method).is_none()
+    }
+
+    /// Whether no method is left that could lower what is left of a state, and that is rounding.
+    pub(crate) fn is_rounding(&self, method: Option<Method>, left: Option<Left<'_>>) -> bool {
+        let required = self.model.setup().linear_solver.required;
+        self.more_robust(method).is_none() && left.is_some_and(|left| left.is_rounding(required))
     }
 
     /// A method, or else the first choice, and the next more robust one that fits, if there is one.

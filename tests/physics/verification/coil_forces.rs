@@ -64,7 +64,7 @@ fn mesh(is_over_iron: bool) -> Mesh {
         BoxRegion {
             name: name.to_owned(),
             corners: [[0.0, 0.0, middle - half], [reach, reach, middle + half]],
-            size: [0.0035, 0.0035, 0.003],
+            size: [0.0042, 0.0042, 0.003],
             skin: free,
             cells: None,
         }
@@ -82,7 +82,7 @@ fn mesh(is_over_iron: bool) -> Mesh {
         regions,
         sizes: Vec::new(),
         surfaces: Vec::new(),
-        growth: 1.6,
+        growth: 1.8,
         refinement: 1.0,
         division: None,
     };

@@ -5,6 +5,7 @@
 //! `--include-ignored` all of them; `just verify` puts them into the page.
 
 mod case;
+mod closed_core;
 mod coil_forces;
 mod families;
 mod forces;

@@ -32,7 +32,7 @@ table! {
     ///
     /// Symmetry planes, for `rim` and `filter_radius`, are the outer faces named in `[boundaries]` or `remesh.slide`: the model
     /// ends there, the device does not. The filter sees the mirror images of the nodes across them, so that a quarter model
-    /// gives the surface of the whole.
+    /// gives the surface of the whole. So does a wedge, whose planes meet at an angle that divides 180 degrees.
     ///
     /// ```toml
     /// [design]
@@ -112,7 +112,9 @@ choice! {
 table! {
     /// Variables that are mirror images of each other across a plane become one: for a mesh of the whole device whose shape is
     /// to stay symmetric. Every node (of a control grid: every point) needs a partner within 1e-6 of the surface's size. A
-    /// `design.direction` of three numbers must lie in the plane; normals become mirror images of each other.
+    /// `design.direction` of three numbers must lie in the plane; normals become mirror images of each other. Where the triangles
+    /// of the surface are no mirror images, as in cells that are all cut along one diagonal, the shape is symmetric up to its
+    /// facets, which is warned of.
     ///
     /// ```toml
     /// [[design.symmetry]]

@@ -194,6 +194,12 @@ const COLUMNS: [&str; 13] = [
     "directory",
 ];
 
+/// Whether the log of a run that has no directory says why: one whose configuration or mesh is refused begins none.
+fn has_failed(layout: &Layout, planned: &Planned) -> bool {
+    let log = std::fs::read_to_string(layout.log(planned)).unwrap_or_default();
+    log.lines().any(|line| line.starts_with("error: "))
+}
+
 impl Row {
     /// Reads the run directory of a combination.
     ///
@@ -203,7 +209,10 @@ impl Row {
         let blank = Self::blank(planned);
         let run = match RunDirectory::open(layout.disk(), &sweep.run_directory(planned)) {
             Ok(run) => run,
-            Err(OutputError::NoRun { .. }) => return Ok(blank),
+            Err(OutputError::NoRun { .. }) => {
+                let status = has_failed(layout, planned).then_some(RunStatus::Failed);
+                return Ok(Self { status, ..blank });
+            }
             Err(error) => return Err(error),
         };
         let manifest = Manifest::read(&run)?;

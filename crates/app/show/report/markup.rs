@@ -11,6 +11,9 @@ const STYLE: &str = include_str!("style.css");
 /// A key figure: name, value, remark.
 pub(crate) type Card = (&'static str, String, String);
 
+/// What says in the head of a page whose it is.
+pub(super) const GENERATOR: &str = "<meta name=\"generator\" content=\"fluxmorph\">";
+
 /// The whole document; `style` and `script` are files of this program.
 pub(crate) fn document(title: &str, style: &'static str, script: &'static str, content: &Markup) -> String {
     let page = html! {
@@ -20,7 +23,7 @@ pub(crate) fn document(title: &str, style: &'static str, script: &'static str, c
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 meta name="color-scheme" content="light dark";
-                meta name="generator" content="fluxmorph";
+                (PreEscaped(GENERATOR))
                 title { (title) }
                 style { (PreEscaped(STYLE)) (PreEscaped(style)) }
             }

@@ -44,6 +44,7 @@ pub(crate) mod ticks;
 mod window;
 mod words;
 
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -51,9 +52,12 @@ use data::RunData;
 
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{Disk, Manifest, RunDirectory, blake3_hex};
+use crate::files::{Disk, Manifest, OutputError, RunDirectory, blake3_hex};
 use crate::run;
 use crate::run::journal::{Journal, configuration_hash};
+
+/// Bytes of a file that tell whether it is a page.
+const HEAD: u64 = 1024;
 
 /// A run directory that a page can be made of.
 #[derive(Debug)]
@@ -104,11 +108,13 @@ impl ReportedRun {
         (&self.config, &self.source)
     }
 
-    /// Writes the page into the directory, unless another process works in it, or to `out`; where it is written.
+    /// Writes the page into the directory, unless another process works in it, or to `out`, where there is nothing yet or a page;
+    /// where it is written.
     ///
     /// # Errors
-    /// Damaged files, a directory in use or changed meanwhile, or when the operating system refuses.
+    /// [`OutputError::NoPage`], damaged files, a directory in use or changed meanwhile, or when the operating system refuses.
     pub fn write(self, out: Option<&Path>) -> Result<PathBuf, Error> {
+        out.map_or(Ok(()), refuse_other_file)?;
         let (mut directory, manifest) = (self.directory.clone(), self.manifest.clone());
         let path = out.map_or_else(|| directory.report(), Path::to_owned);
         let data = RunData::read(self)?;
@@ -120,6 +126,23 @@ impl ReportedRun {
         directory.write(&path, page.as_bytes())?;
         Ok(path)
     }
+}
+
+/// Refuses a path that leads to something else than a page of this program, of which the head is read.
+fn refuse_other_file(path: &Path) -> Result<(), OutputError> {
+    let is_page = match std::fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => true,
+        Err(error) => return Err(OutputError::io("look at", path)(error)),
+        // A pipe has no head until somebody writes into it.
+        Ok(entry) if !entry.is_file() => false,
+        Ok(_) => {
+            let mut head = Vec::new();
+            let file = std::fs::File::open(path).map_err(OutputError::io("read", path))?;
+            file.take(HEAD).read_to_end(&mut head).map_err(OutputError::io("read", path))?;
+            String::from_utf8_lossy(&head).contains(markup::GENERATOR)
+        }
+    };
+    if is_page { Ok(()) } else { Err(OutputError::NoPage { path: path.to_owned() }) }
 }
 
 /// Whether a configuration is, to the letter, the one that a directory was made with, or one that its run may be resumed with.

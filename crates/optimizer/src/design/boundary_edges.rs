@@ -2,10 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fluxmorph_geometry::tet4::{area_vector, centroid, norm};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, sub};
 use fluxmorph_geometry::topology::triangle_edges;
 use fluxmorph_geometry::{Mesh, NodeId};
 
+use super::symmetry_planes::{Askew, SymmetryPlanes};
 use super::{Mirror, dominant_axis};
 
 /// Largest component of a unit normal across its axis for a symmetry plane: coordinates in files carry 6 or more digits.
@@ -41,23 +42,23 @@ impl BoundaryEdges {
         self.free.contains(&node)
     }
 
-    /// The planes of constant coordinate that cut the surface, each once.
-    pub(super) fn symmetry_planes(&self, mesh: &Mesh, cuts: &[[NodeId; 3]]) -> Vec<Mirror> {
+    /// The planes that cut the surface, each once; a point of the surface says on which side it is.
+    pub(super) fn symmetry_planes(&self, mesh: &Mesh, cuts: &[[NodeId; 3]], inside: Point) -> SymmetryPlanes {
         let [lower, upper] = mesh.bounding_box();
-        let mut planes: Vec<Mirror> = Vec::new();
+        let mut planes = SymmetryPlanes::default();
         for triangle in cuts.iter().filter(|t| triangle_edges(**t).iter().any(|edge| self.cut.contains(edge)))
         {
             let vertices = triangle.map(|n| mesh.point(n));
             let area = area_vector(vertices);
             let axis = dominant_axis(area);
             if (0..3).any(|d| d != axis && area[d].abs() > PLANE_TOLERANCE * norm(area)) {
-                continue;
-            }
-            let (at, tolerance) = (centroid(vertices)[axis], PLANE_TOLERANCE * (upper[axis] - lower[axis]));
-            if !planes.iter().any(|plane| plane.axis == axis && (plane.at - at).abs() <= tolerance) {
-                planes.push(Mirror { axis, at });
+                let normal = area.map(|c| c / norm(area));
+                planes.add_askew(Askew::new(normal, centroid(vertices), inside), norm(sub(upper, lower)));
+            } else {
+                let at = centroid(vertices)[axis];
+                planes.add_aligned(Mirror { axis, at }, PLANE_TOLERANCE * (upper[axis] - lower[axis]));
             }
         }
-        planes
+        planes.settled(inside)
     }
 }

@@ -24,7 +24,8 @@ use fluxmorph_geometry::fem::scalar::ordered_sum;
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 
-use super::{DesignError, Mirror, Row};
+use super::symmetry_planes::SymmetryPlanes;
+use super::{DesignError, Row};
 
 /// Most entries of the filter matrix: 0.8 GB.
 const LARGEST: usize = 50_000_000;
@@ -94,11 +95,11 @@ impl<'a> Surface<'a> {
     ///
     /// # Errors
     /// [`DesignError::WideFilter`].
-    pub(super) fn rows(&self, radius: f64, planes: &[Mirror]) -> Result<Vec<Row>, DesignError> {
+    pub(super) fn rows(&self, radius: f64, planes: &SymmetryPlanes) -> Result<Vec<Row>, DesignError> {
         let cell = |x: Point| x.map(|c| (c / radius).floor() as i64);
         let mut cells: BTreeMap<[i64; 3], Vec<Seen>> = BTreeMap::new();
-        for seen in self.with_images(radius, planes) {
-            cells.entry(cell(seen.place)).or_default().push(seen);
+        for (node, place, direction) in planes.with_images(&self.places, self.directions, radius) {
+            cells.entry(cell(place)).or_default().push(Seen { node, place, direction });
         }
         let mut entries = 0;
         let mut rows = Vec::with_capacity(self.places.len());
@@ -125,24 +126,6 @@ impl<'a> Surface<'a> {
         let sum: f64 = weights.values().sum();
         // Only triangles without area give none: the node then follows its own variable.
         if sum > 0.0 { weights.into_iter().map(|(j, w)| (j, w / sum)).collect() } else { vec![(i, 1.0)] }
-    }
-
-    /// All nodes, and their images in the planes within the radius, at most one plane an axis at a time.
-    fn with_images(&self, radius: f64, planes: &[Mirror]) -> Vec<Seen> {
-        let mut all: Vec<Seen> = (0..self.places.len())
-            .map(|node| Seen { node, place: self.places[node], direction: self.directions[node] })
-            .collect();
-        for axis in 0..3 {
-            let mut images = Vec::new();
-            for plane in planes.iter().filter(|plane| plane.axis == axis) {
-                for seen in all.iter().filter(|seen| (seen.place[axis] - plane.at).abs() < radius) {
-                    let (place, direction) = (plane.image(seen.place), plane.reflect(seen.direction));
-                    images.push(Seen { node: seen.node, place, direction });
-                }
-            }
-            all.extend(images);
-        }
-        all
     }
 }
 

@@ -15,6 +15,7 @@ mod grid;
 mod normal;
 mod refined;
 mod symmetry;
+mod symmetry_planes;
 mod transfer;
 
 use std::collections::BTreeSet;
@@ -24,6 +25,7 @@ use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 pub use filter::{cell_size, default_filter_radius};
 pub use grid::{GridSide, dominant_axis};
+pub use symmetry::edges_without_image;
 pub use transfer::{SurfaceMismatch, Triangulation};
 
 /// Weights of the variables at one node, ascending by variable.
@@ -226,7 +228,9 @@ impl DesignSurface {
             Control::Filter(radius) => {
                 let mut surface = filter::Surface::new(mesh, &nodes, &setup.triangles, &directions);
                 surface.mirror_areas(&pairs);
-                let rows = surface.rows(radius, &edges.symmetry_planes(mesh, &setup.cuts))?;
+                let inside =
+                    std::array::from_fn(|d| places.iter().map(|x| x[d]).sum::<f64>() / places.len() as f64);
+                let rows = surface.rows(radius, &edges.symmetry_planes(mesh, &setup.cuts, inside))?;
                 (rows, places, symmetry::groups(nodes.len(), &pairs))
             }
             Control::Grid(counts) => {

@@ -3,14 +3,21 @@
 //! Mirrors are normal to coordinate axes, one an axis at most; so they commute, and the images of a point are at most
 //! eight. A point on a mirror is its own partner.
 
-use fluxmorph_geometry::box_tree::BoxTree;
-use fluxmorph_geometry::tet4::{Point, norm};
+use std::collections::BTreeSet;
 
-use super::{DesignError, Mirror, Row, axis_name};
+use fluxmorph_geometry::box_tree::BoxTree;
+use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::topology::triangle_edges;
+use fluxmorph_geometry::{Mesh, NodeId};
+
+use super::{DesignError, DesignSurface, Mirror, Row, axis_name};
 
 /// Largest distance of a partner from the mirror image, as a share of the points' extent: coordinates in files carry 6 or
 /// more digits, and nodes lie much further apart.
 const TOLERANCE: f64 = 1e-6;
+
+/// Largest difference of two displacements that are alike, for a design of numbers up to 1.
+const ALIKE: f64 = 1e-9;
 
 /// Largest component of a unit direction across a mirror: the rounding of the digits of a configuration.
 const OBLIQUE: f64 = 1e-9;
@@ -24,14 +31,8 @@ pub(super) fn pairs(
     points: &[Point],
     mirrors: &[Mirror],
 ) -> Result<Vec<Vec<usize>>, DesignError> {
-    let extent = (0..3)
-        .map(|d| {
-            let (low, high) = points
-                .iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x[d]), high.max(x[d])));
-            high - low
-        })
-        .fold(0.0, f64::max);
+    let [low, high] = bounds(points);
+    let extent = sub(high, low).into_iter().fold(0.0, f64::max);
     let tolerance = TOLERANCE * extent;
     let tree = BoxTree::of_points(points);
     let partner = |mirror: &Mirror, point: Point| {
@@ -44,6 +45,40 @@ pub(super) fn pairs(
         Err(DesignError::NoPartner { what, point, axis, at, distance })
     };
     mirrors.iter().map(|mirror| points.iter().map(|&point| partner(mirror, point)).collect()).collect()
+}
+
+/// How many edges of a surface do not move as their mirror images do, where the nodes do: the surface is symmetric in its nodes alone,
+/// and not between them. An edge that is none on the other side has the edge through its mirrored middle as image, as where two cells
+/// are cut along different diagonals, and moves like it where the quadrilateral of both stays plane.
+pub fn edges_without_image(
+    mesh: &Mesh,
+    (surface, triangles): (&DesignSurface, &[[NodeId; 3]]),
+    mirrors: &[Mirror],
+) -> usize {
+    let edges: BTreeSet<[NodeId; 2]> = triangles.iter().flat_map(|t| triangle_edges(*t)).collect();
+    let edges: Vec<[NodeId; 2]> = edges.into_iter().collect();
+    let design: Vec<f64> = (0..surface.variable_count()).map(|k| (k as f64).sin()).collect();
+    let displacement = surface.displacement(&design);
+    let of_node = |n: NodeId| surface.nodes().binary_search(&n).map_or([0.0; 3], |row| displacement[row]);
+    let sum = |[a, b]: [Point; 2]| -> Point { std::array::from_fn(|d| a[d] + b[d]) };
+    let middles: Vec<Point> =
+        edges.iter().map(|edge| sum(edge.map(|n| mesh.point(n))).map(|c| 0.5 * c)).collect();
+    let [low, high] = bounds(&middles);
+    let tree = BoxTree::of_points(&middles);
+    let moves_alike = |mirror: &Mirror, k: usize| {
+        let Some((image, square)) = tree.nearest(mirror.image(middles[k])) else { return false };
+        let [own, other] = [k, image].map(|k| sum(edges[k].map(of_node)));
+        square.sqrt() <= TOLERANCE * norm(sub(high, low)) && norm(sub(mirror.reflect(own), other)) < ALIKE
+    };
+    (0..edges.len()).filter(|&k| !mirrors.iter().all(|mirror| moves_alike(mirror, k))).count()
+}
+
+/// The box around points.
+fn bounds(points: &[Point]) -> [Point; 2] {
+    let of = |start: f64, pick: fn(f64, f64) -> f64| {
+        std::array::from_fn(|d| points.iter().fold(start, |bound, x| pick(bound, x[d])))
+    };
+    [of(f64::INFINITY, f64::min), of(f64::NEG_INFINITY, f64::max)]
 }
 
 /// Checks that one direction for all nodes is in every mirror plane.

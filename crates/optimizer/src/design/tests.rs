@@ -371,3 +371,68 @@ fn a_grid_over_a_surface_that_turns_back_is_refused() {
         DesignSetup { control: Control::Grid([3, 3]), ..DesignSetup::new(&outward(&mesh, "x_max"), UP) };
     assert!(matches!(DesignSurface::new(&mesh, &side), Err(DesignError::NoExtent { axis: 'x' })));
 }
+
+#[test]
+fn a_filter_sees_the_images_in_planes_askew_as_in_those_of_the_axes() {
+    let turned = |x: Point| {
+        let (sin, cos) = 0.5_f64.sin_cos();
+        [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]]
+    };
+    let [upright, askew] = [moved_block(6, |x| x), moved_block(6, turned)]
+        .map(|mesh| build(&mesh, &quarter(&mesh, UP, Control::Filter(0.4))));
+    for (own, other) in upright.rows().iter().zip(askew.rows()) {
+        assert_eq!(own.len(), other.len());
+        let off = own.iter().zip(other).map(|(a, b)| (a.1 - b.1).abs()).fold(0.0, f64::max);
+        assert!(off < 1e-12 && own.iter().zip(other).all(|(a, b)| a.0 == b.0), "{own:?} {other:?}");
+    }
+}
+
+/// Half of a quarter, below the diagonal, over which the triangles of a block are mirror images: images of images are the other
+/// quarters.
+#[test]
+fn a_filter_on_an_eighth_gives_the_surface_of_the_quarter() {
+    let mesh = moved_block(6, |x| x);
+    let whole = quarter(&mesh, UP, Control::Filter(0.4));
+    let is_below = |t: &[NodeId; 3]| t.iter().all(|&n| mesh.point(n)[0] >= mesh.point(n)[1] - 1e-9);
+    let triangles: Vec<_> = whole.triangles.iter().copied().filter(is_below).collect();
+    assert_eq!(2 * triangles.len(), whole.triangles.len());
+    let on_diagonal = |k: usize, z: f64| {
+        let at = |x: Point| (x[0] - k as f64 / 6.0).abs() + (x[1] - k as f64 / 6.0).abs() + (x[2] - z).abs();
+        mesh.topology().nodes().find(|&n| at(mesh.point(n)) < 1e-9).expect("a node of the block")
+    };
+    let diagonal = (0..6).map(|k| [on_diagonal(k, 1.0), on_diagonal(k + 1, 1.0), on_diagonal(k, 0.5)]);
+    let cuts: Vec<_> = outward(&mesh, "y_min").into_iter().chain(diagonal).collect();
+    let eighth = build(&mesh, &DesignSetup { triangles, cuts, ..whole.clone() });
+    let whole = build(&mesh, &whole);
+    let symmetric = |x: Point| (3.0 * x[0]).sin() * (3.0 * x[1]).sin() + x[0] * x[1] + x[0] + x[1];
+    let [heights, expected] =
+        [&eighth, &whole].map(|surface| surface.normal_displacements(&values(surface, symmetric)));
+    let place = |n: &NodeId| whole.nodes().iter().position(|other| other == n).expect("a node of both");
+    for (node, height) in eighth.nodes().iter().zip(heights) {
+        let whole = expected[place(node)];
+        assert!((height - whole).abs() < 1e-12, "{:?}: {height} {whole}", mesh.point(*node));
+    }
+}
+
+/// Facets of a wall that is round meet at angles that no device with symmetry planes has.
+#[test]
+fn the_facets_of_a_curved_wall_have_no_images() {
+    let bent = |x: Point| [x[0] - 0.1 * (3.0 * x[1]).sin(), x[1], x[2]];
+    let mesh = moved_block(6, bent);
+    let both = quarter(&mesh, UP, Control::Filter(0.4));
+    let straight = DesignSetup { cuts: outward(&mesh, "y_min"), ..both.clone() };
+    assert_eq!(build(&mesh, &both).rows(), build(&mesh, &straight).rows());
+}
+
+/// The cells of a block are all cut along one diagonal: the heights of a grid that are the same across the mirror leave no trace of it.
+#[test]
+fn a_surface_that_is_symmetric_in_its_nodes_alone_is_known() {
+    let mesh = moved_block(6, |x| x);
+    let mirrors = vec![Mirror { axis: 0, at: 0.5 }];
+    let count = |control: Control| {
+        let setup = DesignSetup { mirrors: mirrors.clone(), cuts: Vec::new(), ..quarter(&mesh, UP, control) };
+        edges_without_image(&mesh, (&build(&mesh, &setup), &setup.triangles), &mirrors)
+    };
+    assert!(count(Control::Nodes) > 0 && count(Control::Grid([4, 3])) > 0);
+    assert_eq!(count(Control::Grid([2, 3])), 0);
+}

@@ -2,16 +2,19 @@
 //!
 //! Of `target_field` it is `|B − B_target|`; of a homogeneity `|B − B̄|`, or what the component or the modulus has more than its
 //! mean; of the content of an expansion what is left of the field inside the circle or the ball without its main terms. All of it
-//! at the middle of the element; a component that alternates has its magnitude. The elements' volumes are the picture's weights,
-//! not the functional's, which may count cells.
+//! at the middle of the element; a component that alternates has its magnitude. Of elements of first order, which have one `B` each,
+//! an expansion and what is left of it are of the recovered field. The elements' volumes are the picture's weights, not the
+//! functional's, which may count cells.
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::centroid;
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use super::{Functional, MultipoleFunctional, Observation};
+use crate::Order;
 use crate::element::Complex3;
 use crate::model::FieldModel;
+use crate::recovery::RecoveredPoint;
 use crate::solution::FieldSolution;
 
 /// Barycentric coordinates of the middle.
@@ -53,8 +56,12 @@ fn of_expansion(
     let Some(main) = functional.main_field(model, mesh, solution) else { return Vec::new() };
     let inside = mesh.topology().elements().filter(|&e| main.domain().meets(mesh.vertices(e)));
     let at = |e| {
-        let b = solution.at(model, mesh, e, &MIDDLE).flux_density;
-        let left = main.remainder(centroid(mesh.vertices(e)), b);
+        let middle = centroid(mesh.vertices(e));
+        let b = match model.setup().order {
+            Order::Linear => RecoveredPoint::new(model, mesh, e, middle).flux_density(solution, model, mesh),
+            Order::Quadratic => solution.at(model, mesh, e, &MIDDLE).flux_density,
+        };
+        let left = main.remainder(middle, b);
         (e, if model.angular_frequency() == 0.0 { signed(left) } else { size(left) })
     };
     inside.map(at).collect()

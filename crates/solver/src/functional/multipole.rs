@@ -178,6 +178,9 @@ impl Multipoles {
         Ok(Self { places, terms, domain: expansion.domain })
     }
 
+    /// What a place holds that is in no element, nor is any image of it in the planes of an expansion.
+    pub const NOWHERE: &str = "a hole in the mesh, or what is beyond an oblique plane of symmetry";
+
     /// The first place of an expansion where B is not the field of sources outside it in one of some states, and what is there: of
     /// a ball anywhere in it, of a circle on it. The terms would be those of no field there.
     pub fn disturbance(
@@ -207,10 +210,7 @@ impl Multipoles {
             sampled.iter().zip(&held).find_map(|(&place, held)| {
                 // On a face either side may be meant: it must be on both.
                 let on_all = held.iter().map(|&(x, element)| matter_at(element, x)).reduce(Option::and);
-                on_all.unwrap_or(Some((
-                    place,
-                    "a hole in the mesh, or what is beyond an oblique plane of symmetry",
-                )))
+                on_all.unwrap_or(Some((place, Self::NOWHERE)))
             })
         };
         let inside = || {

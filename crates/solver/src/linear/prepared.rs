@@ -84,18 +84,12 @@ impl PreparedSystem {
 
     /// The matrix of the field; `None` where it is on several ranks.
     pub fn matrix(&self) -> Option<&CsrMatrix<c64>> {
-        match &self.field {
-            FieldSystem::Local(system) => Some(system.matrix()),
-            FieldSystem::Distributed(_) => None,
-        }
+        self.field.matrix()
     }
 
     /// The method in use; `None` where the matrix is on several ranks.
     pub fn method(&self) -> Option<Method> {
-        match &self.field {
-            FieldSystem::Local(system) => Some(system.method()),
-            FieldSystem::Distributed(_) => None,
-        }
+        self.field.method()
     }
 
     /// Bytes of the preconditioner in this process, as far as they are known.
@@ -225,6 +219,22 @@ impl PreparedSystem {
 }
 
 impl FieldSystem {
+    /// The matrix; `None` where it is on several ranks.
+    pub(crate) fn matrix(&self) -> Option<&CsrMatrix<c64>> {
+        match self {
+            Self::Local(system) => Some(system.matrix()),
+            Self::Distributed(_) => None,
+        }
+    }
+
+    /// The method in use; `None` where the matrix is on several ranks.
+    pub(crate) fn method(&self) -> Option<Method> {
+        match self {
+            Self::Local(system) => Some(system.method()),
+            Self::Distributed(_) => None,
+        }
+    }
+
     /// What the solver did beside solving.
     pub(crate) fn events(&self) -> &[SolverEvent] {
         match self {

@@ -7,6 +7,7 @@
 //! | the right side has an entry that is not finite, or the square of its norm is out of range | an error, nothing is solved |
 //! | a diagonal entry is zero, negative or not finite; a pivot is zero, lost or not finite; no memory | the next more robust method |
 //! | the iteration breaks down, diverges to no number, or stops short of the residual | with an earlier factor: a factor of this matrix; with its own: the next method |
+//! | the last method stops short of the residual, at the rounding of `K x` | the solution, where what is left has no share of its energy |
 //! | no method is left | an error with the last cause |
 //!
 //! A solution is given out only with its true residual, computed from matrix and right side in double precision: a residual
@@ -25,6 +26,7 @@ use super::method::{Method, Reuse};
 use super::preconditioner::Preconditioner;
 use super::range::checked_norm;
 use super::report::LinearSolverReport;
+use super::rounding::Left;
 use crate::error::{NonConvergence, SolverError};
 
 /// Iterations after which the speed of an iteration can be judged.
@@ -259,12 +261,15 @@ impl LocalSystem {
                 _ if self.origin == Origin::Earlier => self.refresh(self.method())?,
                 Attempt::Ended(residual) => {
                     report.residual = residual;
+                    if report.iterations > before && self.is_solved_but_for_rounding(right_side, &x) {
+                        break;
+                    }
                     self.fall_back(&report)?;
                 }
                 Attempt::TooSlow => unreachable!("an own factor is never too slow"),
             }
             // What a failed iteration leaves may be farther from the solution than zero, or no number.
-            let left = self.residual(right_side, &x);
+            let left = norm(&self.residual(right_side, &x));
             if left.is_nan() || left >= scale {
                 x.fill(c64::default());
             }
@@ -295,7 +300,7 @@ impl LocalSystem {
     fn start(&mut self, right_side: &[c64], scale: f64) -> Vec<c64> {
         let position = self.solutions.len();
         match self.before.get_mut(position).map(std::mem::take) {
-            Some(x) if x.len() == right_side.len() && self.residual(right_side, &x) < scale => x,
+            Some(x) if x.len() == right_side.len() && norm(&self.residual(right_side, &x)) < scale => x,
             _ => vec![c64::default(); right_side.len()],
         }
     }
@@ -343,7 +348,7 @@ impl LocalSystem {
                 return Attempt::TooSlow;
             }
             let before = residual;
-            residual = self.residual(right_side, x) / scale;
+            residual = norm(&self.residual(right_side, x)) / scale;
             let settled = residual <= goal.required || outcome.iterations == 0;
             if settled || !residual.is_finite() || residual > 0.1 * before {
                 break;
@@ -400,14 +405,26 @@ impl LocalSystem {
         self.refresh(to)
     }
 
-    /// `|b − K x|`.
-    fn residual(&self, right_side: &[c64], x: &[c64]) -> f64 {
+    /// Whether what the last method of all leaves is the rounding of `K x` alone.
+    fn is_solved_but_for_rounding(&self, right_side: &[c64], x: &[c64]) -> bool {
+        let own = self.preconditioner.as_ref().filter(|own| own.method == Method::Direct);
+        let Some(factor) = own.filter(|_| self.origin == Origin::Own) else { return false };
+        let residual = self.residual(right_side, x);
+        let mut step = vec![c64::default(); x.len()];
+        factor.apply(&residual, &mut step);
+        let left =
+            Left { matrix: &self.matrix, load: right_side, solution: x, residual: &residual, step: &step };
+        left.is_rounding(self.goal_now().required)
+    }
+
+    /// `b − K x`.
+    fn residual(&self, right_side: &[c64], x: &[c64]) -> Vec<c64> {
         let mut r = vec![c64::default(); x.len()];
         self.matrix.mul(x, &mut r);
         for (r, b) in r.iter_mut().zip(right_side) {
             *r = b - *r;
         }
-        norm(&r)
+        r
     }
 }
 

@@ -106,6 +106,9 @@ impl<'a> Cursor<'a> {
             return self.truncated(expected);
         }
         let found = match rest.iter().position(u8::is_ascii_whitespace) {
+            Some(0) if rest[0] == b'\r' && rest.get(1) != Some(&b'\n') => {
+                "a carriage return without a line feed, which ends no line".to_owned()
+            }
             Some(0) => "the end of the line".to_owned(),
             end => shown(&rest[..end.unwrap_or(rest.len())]),
         };
