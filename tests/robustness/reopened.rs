@@ -204,7 +204,7 @@ fn what_is_no_interrupted_run_is_left_alone() {
     std::fs::create_dir(&piped).expect("made");
     let made = Command::new("mkfifo").arg(piped.join("manifest.json")).status();
     assert!(made.expect("mkfifo is there").success());
-    finish(&mut resume(&piped)).with(5, &["holds no run of fluxmorph"]);
+    finish(&mut resume(&piped)).with(5, &["manifest.json`: it is no plain file"]);
 }
 
 /// The command that a message offers, given to a shell that finds this program first.

@@ -176,7 +176,7 @@ fn evaluations_that_another_program_removes_are_not_said_to_be_saved() {
     let (code, said) = run.end();
     assert_eq!(code, Some(130), "{said}");
     assert!(
-        said.contains("journal.jsonl holds 0 of ") && said.contains("computes the others anew"),
+        said.contains("journal.jsonl` holds 0 of ") && said.contains("computes the others anew"),
         "{said}"
     );
     assert!(!said.contains("all evaluations are saved"), "{said}");

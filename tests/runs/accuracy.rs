@@ -354,11 +354,11 @@ fn what_a_result_reports_beside_an_objective_has_error_bars() {
         let done = finish(command(&[&"solve", &path, &"--out", &out]).args(options)).completed();
         (read_json(&out.join("result.json")), done)
     };
-    let second = ["--set", "analysis.order=2", "--set"];
-    let [never, always] = ["accuracy.estimate=false", "accuracy.estimate=true"];
+    let second = |set: &'static str| ["--set", "analysis.order=2", "--set", set];
     let (first, said) = solved("first", &[]);
-    let (halved, _) = solved("halved", &[&second[..], &[never, "--refine", "1"]].concat());
-    let (on_the_mesh, _) = solved("second", &[&second[..], &[always]].concat());
+    let refined = [&second("accuracy.estimate=false")[..], &["--refine", "1"]].concat();
+    let (halved, _) = solved("halved", &refined);
+    let (on_the_mesh, _) = solved("second", &second("accuracy.estimate=true"));
     assert!(first["objective"].is_null() && halved["errors"].is_null(), "{first}");
     let accuracy = &first["accuracy"];
     assert!(accuracy["error_estimate_relative"].is_null() && accuracy["near_wall"].is_string(), "{accuracy}");

@@ -6,7 +6,7 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology, millimetres};
 use fluxmorph_optimizer::design::{
     BoundaryMotion, Control, DesignError, DesignSetup, DesignSurface, Direction, Mirror, Triangulation,
-    default_filter_radius,
+    default_filter_radius, edges_without_image,
 };
 
 use super::outline::same_nodes;
@@ -85,8 +85,24 @@ pub(crate) fn triangulation(design: &config::Design, mesh: &Mesh) -> Result<Tria
 }
 
 /// The planes of symmetry.
-pub(super) fn mirrors(design: &config::Design) -> Vec<Mirror> {
+fn mirrors(design: &config::Design) -> Vec<Mirror> {
     design.symmetry.iter().map(|plane| Mirror { axis: plane.axis.index(), at: plane.at }).collect()
+}
+
+/// A surface that is symmetric in its nodes alone, as where the cells of a generator are all cut along the same diagonal.
+pub(super) fn asymmetry_warning(
+    design: &config::Design,
+    mesh: &Mesh,
+    surface: (&DesignSurface, &[[NodeId; 3]]),
+) -> Option<String> {
+    let count = edges_without_image(mesh, surface, &mirrors(design));
+    (count > 0).then(|| {
+        format!(
+            "design.symmetry: {count} edges of the design surface have no mirror image that moves as they do. Between its nodes the \
+             shape is symmetric up to its facets, and so are forces that should cancel. Half of the device, which ends in the plane, \
+             has no such difference"
+        )
+    })
 }
 
 /// The triangles themselves.

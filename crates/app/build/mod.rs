@@ -2,7 +2,7 @@
 //!
 //! Every name is checked against the mesh before anything is computed, and all faults are reported at once at their
 //! keys. `mesh` makes the mesh, `field` the field problems, `loads` what excites them, `functional` objective and constraints, `design` the design
-//! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `applied` that of applied fields, `probes` where nothing is measured, `elements` what family and order cannot represent, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
+//! surface, `shape` the elastic map, `references` where names stand and `names` whether the mesh has them, `plausible` what cannot be meant, `thin_windings` what cells are too wide for, `applied` that of applied fields, `probes` where nothing is measured, `elements` what family and order cannot represent, `soundness` what is wrong with the mesh as a whole, `skin` the audits of conductors, `motion` a prescribed motion without a field problem, `outline` what a report draws.
 
 mod applied;
 mod curves;
@@ -32,6 +32,7 @@ mod share;
 mod skin;
 mod soundness;
 pub(crate) mod steels;
+mod thin_windings;
 mod truncation;
 
 pub(crate) use design::triangulation as design_triangulation;

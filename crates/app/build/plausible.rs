@@ -7,15 +7,15 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use fluxmorph_geometry::soundness::OpenPatch;
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub, volume};
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
-use rayon::prelude::*;
 
 use super::entries::material;
 use super::references::functionals;
 use super::soundness::{faces_of, faces_without_condition};
+use super::thin_windings::{self, section};
 use crate::config::{
     Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, LoadCase, MeshConfig,
     ObjectiveKind, RegionModel, SourceMap,
@@ -24,15 +24,6 @@ use crate::config::{
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
 /// one is the same.
 const THINNEST: f64 = 1e-6;
-
-/// Width of the elements over that of a winding, for first order, above which its inductance is off by a twentieth or more: a ring
-/// of 100 mm in open space has 0.90, 0.83, 0.75 and 0.64 of it in cells of 1, 2, 4 and 10 times its width, and with second order
-/// 0.93, 0.86 and 0.75 in those of 2, 4 and 10 times; a rectangular coil of 80 mm by 60 mm 0.98, 0.95 and 0.91 in those of 0.5, 0.7
-/// and 1 times.
-const THIN: f64 = 0.7;
-
-/// Share of the length of a winding in such elements that is not spoken of.
-const FEW: f64 = 0.3;
 
 /// Shares of the mesh's size below and above which a coil looks like one in another unit.
 const ALIKE: [f64; 2] = [2e-2, 2.0];
@@ -172,7 +163,8 @@ pub(super) fn warnings(
     }));
     warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
     warnings.extend(
-        windings(coils).filter_map(|(i, winding)| thin_warning(config, mesh, &config.coils[i], winding)),
+        windings(coils)
+            .filter_map(|(i, winding)| thin_windings::warning(config, mesh, &config.coils[i], winding)),
     );
     warnings.extend(super::forces::warnings(config, mesh, coils));
     warnings.extend(phase_warnings(config));
@@ -441,47 +433,6 @@ fn half_extent(coil: &Coil) -> Option<[f64; 3]> {
         CoilShape::Circular(c) => of([c.radius; 2], c.width, c.height),
         CoilShape::Region(_) => None,
     }
-}
-
-/// What to say of a winding whose inductance is asked for and that is thinner than the elements in which it lies.
-fn thin_warning(config: &Config, mesh: &Mesh, coil: &Coil, winding: &Racetrack) -> Option<String> {
-    coil.turns?;
-    let across = section(coil).into_iter().map(|(_, length)| length).product::<f64>().sqrt();
-    // Along the current, and across it: of six tetrahedra that are a brick.
-    let sizes = |e: ElementId| {
-        let vertices = mesh.vertices(e);
-        let current = winding.current_density(winding.wound_place(vertices)?);
-        let along = vertices.map(|x| dot(x, current) / norm(current));
-        let length = along.into_iter().fold(f64::MIN, f64::max) - along.into_iter().fold(f64::MAX, f64::min);
-        Some((length, (6.0 * volume(vertices) / length).sqrt()))
-    };
-    let elements: Vec<ElementId> = mesh.topology().elements().collect();
-    let found: Vec<(f64, f64)> = elements.into_par_iter().filter_map(sizes).collect();
-    let limit = THIN * f64::from(u8::from(config.analysis.order)) * across;
-    let wide = || found.iter().filter(|(_, width)| *width > limit);
-    let widest = wide().map(|(_, width)| *width).fold(0.0, f64::max);
-    let share =
-        wide().map(|(length, _)| length).sum::<f64>() / found.iter().map(|(length, _)| length).sum::<f64>();
-    (share > FEW).then(|| {
-        format!(
-            "the winding of `{}` is {:.3} mm across in cells of up to {:.3} mm: the field in and beside it is that of a thicker \
-             one, and its own inductance too small, with first order by a tenth in cells as wide as it and by a third in those of \
-             ten times its width; elements as small as it is thin cure that",
-            coil.name,
-            Millimetres(across),
-            Millimetres(widest)
-        )
-    })
-}
-
-/// The sizes of an analytic coil's winding by their keys [m].
-fn section(coil: &Coil) -> Vec<(&'static str, f64)> {
-    let (width, height) = match &coil.shape {
-        CoilShape::Racetrack(c) => (c.width, c.height),
-        CoilShape::Circular(c) => (c.width, c.height),
-        CoilShape::Region(_) => return Vec::new(),
-    };
-    vec![("width", width), ("height", height)]
 }
 
 /// A region of iron or of a conductor that the current of a coil flows in, and where.

@@ -7,7 +7,7 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{Point, add, area_vector, centroid, dot, norm};
 use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, millimetres};
-use fluxmorph_optimizer::design::{DesignSurface, GridSide, edges_without_image};
+use fluxmorph_optimizer::design::{DesignSurface, GridSide};
 use fluxmorph_optimizer::geometric::{WallThickness, faces_with_bodies};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup, Subregion};
@@ -74,7 +74,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         warnings.extend(sides.into_iter().filter_map(|side| fine_grid_warning(side, full_mesh, &triangles)));
         warnings.extend(idle_warning(&surface));
     }
-    warnings.extend(asymmetry_warning(design, full_mesh, (&full_surface, &triangles)));
+    warnings.extend(super::design::asymmetry_warning(design, full_mesh, (&full_surface, &triangles)));
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
     warnings.extend(held_warning(inputs.remesh, mesh, &surface));
     warnings.extend(slid_warning(inputs.remesh, design));
@@ -117,22 +117,6 @@ fn mean_extent(mesh: &Mesh, triangles: &[[NodeId; 3]], axis: usize) -> f64 {
         whole += area;
     }
     sum / whole
-}
-
-/// A surface that is symmetric in its nodes alone, as where the cells of a generator are all cut along the same diagonal.
-fn asymmetry_warning(
-    design: &Design,
-    mesh: &Mesh,
-    surface: (&DesignSurface, &[[NodeId; 3]]),
-) -> Option<String> {
-    let count = edges_without_image(mesh, surface, &super::design::mirrors(design));
-    (count > 0).then(|| {
-        format!(
-            "design.symmetry: the nodes of the design surface are mirror images of each other, and {count} of its edges have none: \
-             between its nodes the shape is symmetric up to the facets, and forces that should cancel do so up to these; half of the \
-             device, which ends in the plane, has no such difference"
-        )
-    })
 }
 
 /// Points of a control grid that move nothing.

@@ -150,7 +150,7 @@ impl Truncation {
         let ratio = distance_m / source_size_m;
         (ratio < *near).then(|| {
             format!(
-                "the wall {} is {:.3} mm from coils, matter and what is observed, {ratio:.1} times their half diagonal: where it stands \
+                "the wall {} is {:.3} mm from the box around coils, matter and what is observed, {ratio:.1} times their half diagonal: where it stands \
                  for open space, no error bar counts what it cuts off; walls farther off show how much that is",
                 self.named("`"),
                 Millimetres(*distance_m)
@@ -305,7 +305,9 @@ mod tests {
         };
         let text = at(0.29, NEAR).described().expect("it is near");
         assert!(
-            text.contains("`x_max` is 290.000 mm from coils, matter and what is observed, 2.9 times"),
+            text.contains(
+                "`x_max` is 290.000 mm from the box around coils, matter and what is observed, 2.9 times"
+            ),
             "{text}"
         );
         assert_eq!(at(0.31, NEAR).described(), None);

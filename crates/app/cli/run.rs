@@ -12,7 +12,6 @@ use crate::config::OutputNamedBy;
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{RunDirectory, RunStatus, StopReason, extend_command, resume_command, system_disk};
-use crate::run::journal::Journal;
 use crate::run::{self, Concluded, Options, RunLimits, SavedRun};
 use crate::show::RunObserver;
 use crate::show::report::ReportedRun;
@@ -79,19 +78,10 @@ fn conclude(
     signal: &Signal,
     observer: &mut dyn RunObserver,
 ) -> Result<ExitCode, Error> {
-    let Concluded { result, directory: held } = concluded?;
+    let Concluded { result, directory: held, is_saved } = concluded?;
     let directory = ended.directory;
     // Whoever reads standard output may have no room for it: what belongs into the directory comes there all the same.
     let printed = if ended.json { stdout::print_json(&result) } else { Ok(()) };
-    let saved = Journal::read_records(&held).map_or(0, |records| records.len());
-    let is_saved = saved >= result.evaluations;
-    if !is_saved {
-        observer.warning(&format!(
-            "journal.jsonl holds {saved} of {} evaluations: it was removed or changed while the run went on, and `resume` computes \
-             the others anew",
-            result.evaluations
-        ));
-    }
     if ended.report {
         // The result is worth more than a page about it: not even a bug in the page changes how the run ends.
         match page(held) {

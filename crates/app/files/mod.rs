@@ -87,7 +87,7 @@ pub enum OutputError {
     NoManifest { path: PathBuf },
     /// A page would take the place of something else.
     #[error(
-        "`{path}` is there and is no page of fluxmorph; nothing in it was touched: name another file with --out, or remove it"
+        "`{path}` is there and is no page of fluxmorph; it was not touched: name another file with --out"
     )]
     NoPage { path: PathBuf },
     /// Another process writes into the directory.

@@ -244,8 +244,8 @@ impl Session<'_> {
             };
             observer.warning(&format!(
                 "the gain of this run is not confirmed: less than half of F/F0 - 1, or a quarter of F - F0, is left on another \
-                 mesh, by other elements, without the estimated errors, with its facets on their surfaces or with what impedance surfaces leave out; {cure}, with \
-                 smaller faces where they are curved"
+                 mesh, by other elements, without the estimated errors, with its facets on their surfaces or with what impedance \
+                 surfaces leave out. Cure: {cure}, with smaller faces where they are curved"
             ));
         }
         if accuracy.hides_gain(objective.ratio) {

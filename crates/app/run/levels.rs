@@ -125,9 +125,15 @@ impl<'a> Levels<'a> {
 
     /// An error bar beside the tolerance, in words.
     fn compared(&self, design: &str, bar: f64) -> String {
-        let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+        let percent = |share: f64| match 100.0 * share {
+            small if small < 0.01 => format!("{small:.1e} %"),
+            percent => format!("{percent:.2} %"),
+        };
         let (bar, tolerance) = (percent(bar), percent(self.tolerance));
-        format!("the error bar of the {design} design is {bar}, accuracy.tolerance {tolerance}")
+        format!(
+            "the error bar of the {design} design is {bar} of the larger of the initial and the best objective, \
+             accuracy.tolerance {tolerance}"
+        )
     }
 
     /// What estimates the errors of designs on the mesh as it is.

@@ -101,6 +101,8 @@ pub fn run(
 pub(crate) struct Concluded {
     pub(crate) result: RunResult,
     pub(crate) directory: RunDirectory,
+    /// Whether the journal has every evaluation.
+    pub(crate) is_saved: bool,
 }
 
 /// [`run`], with the directory still held.
@@ -328,7 +330,12 @@ impl Session<'_> {
         let result = outcome?;
         completed?;
         observer.finished(&result);
-        Ok(Concluded { result, directory: self.directory })
+        let has_journal = self.command == "run";
+        let loss = has_journal.then(|| Journal::loss(&self.directory, result.evaluations)).flatten();
+        if let Some(loss) = &loss {
+            observer.warning(loss);
+        }
+        Ok(Concluded { result, directory: self.directory, is_saved: loss.is_none() })
     }
 
     /// Whether a run that ended with an error can be resumed: what fails in the first evaluation fails in it again.

@@ -96,7 +96,7 @@ pub(crate) fn resume_held(
     config.optimizer.max_time = limits.max_time.or(in_force.max_time_s);
     if let Some(result) = finished_result(&directory, &manifest, config.optimizer.max_evaluations) {
         observer.note(&format!("nothing to resume: {}", advice(&result)));
-        return Ok(Concluded { result, directory });
+        return Ok(Concluded { result, directory, is_saved: true });
     }
     let prepared = Prepared::new(&config, &source, Mode::Optimisation, options, observer).map_err(
         |error| match error {

@@ -50,6 +50,7 @@ fn device(iron: &str, frequency: f64, more: &str) -> String {
         material = "iron"
         [[coils]]
         name = "bar"
+        turns = 1
         ampere_turns = "10 A"
         region = "winding"
         terminals = ["y_min", "y_max"]
@@ -83,7 +84,8 @@ fn the_flux_linkage_of_a_winding_in_closed_iron_is_exact() {
             .completed();
         let result = read_json(&out.join("result.json"));
         let residual = number(&result, "/linear_solver/worst_residual");
-        let (found, exact) = (number(&result, "/coils/0/flux_linkage_wb/0"), flux_linkage(flux_density));
+        let path = if frequency == 0.0 { "/coils/0/flux_linkage_wb" } else { "/coils/0/flux_linkage_wb/0" };
+        let (found, exact) = (number(&result, path), flux_linkage(flux_density));
         println!("{iron}, {frequency} Hz: {found:.7e} Wb, exact {exact:.7e} Wb, residual {residual:.1e}");
         assert!((found / exact - 1.0).abs() < 1e-6, "{found} {exact}");
         // Less is not to be had in double precision, and more than a linear system elsewhere is solved to.

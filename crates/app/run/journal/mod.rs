@@ -126,6 +126,21 @@ impl Journal {
         Err(OutputError::Damaged { path: directory.journal(), message })
     }
 
+    /// What to say where the journal of a run that has ended lacks evaluations: another program has removed, cut or damaged it.
+    pub(super) fn loss(directory: &RunDirectory, evaluations: usize) -> Option<String> {
+        let saved = match Self::read(directory) {
+            Ok(contents) => contents.map_or(0, |contents| contents.records.len()),
+            Err(error) => return Some(error.to_string()),
+        };
+        (saved < evaluations).then(|| {
+            format!(
+                "`{}` holds {saved} of {evaluations} evaluations: another program has removed or changed it while the run went on, and \
+                 `resume` computes the others anew",
+                directory.journal().display()
+            )
+        })
+    }
+
     /// Keeps a copy of a damaged journal beside it, before it is cut after its whole records.
     pub fn keep_damaged(directory: &RunDirectory) -> Result<(), OutputError> {
         let path = directory.journal();

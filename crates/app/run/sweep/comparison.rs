@@ -38,7 +38,7 @@ pub struct Comparison {
 pub struct Row {
     /// Values of the swept keys.
     pub values: Vec<String>,
-    /// How far its run is; `None` where it has not begun.
+    /// How far its run is, also of one that failed before it had a directory; `None` where it has not begun.
     pub status: Option<RunStatus>,
     /// Why it ended.
     pub stop_reason: Option<StopReason>,

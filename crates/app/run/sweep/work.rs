@@ -82,6 +82,10 @@ impl Workers {
         interrupted: &dyn Fn() -> Option<ExitCode>,
         report: &mut dyn FnMut(Event) -> Result<(), Error>,
     ) -> Result<(), Error> {
+        // The log of a combination that is begun anew says nothing of it any more.
+        for (index, _) in tasks.iter().filter(|(_, task)| matches!(task, Task::Begin(_))) {
+            let _ = std::fs::remove_file(layout.log(&sweep.combinations[*index]));
+        }
         let mut waiting = tasks.iter().copied();
         let mut running: Vec<Running> = Vec::new();
         let mut is_interrupted = false;

@@ -114,9 +114,8 @@ impl ReportedRun {
     /// # Errors
     /// [`OutputError::NoPage`], damaged files, a directory in use or changed meanwhile, or when the operating system refuses.
     pub fn write(self, out: Option<&Path>) -> Result<PathBuf, Error> {
-        out.map_or(Ok(()), refuse_other_file)?;
         let (mut directory, manifest) = (self.directory.clone(), self.manifest.clone());
-        let path = out.map_or_else(|| directory.report(), Path::to_owned);
+        let path = out.map_or_else(|| Ok(directory.report()), place_of_page)?;
         let data = RunData::read(self)?;
         if out.is_none() {
             directory = directory.locked()?;
@@ -128,21 +127,31 @@ impl ReportedRun {
     }
 }
 
-/// Refuses a path that leads to something else than a page of this program, of which the head is read.
-fn refuse_other_file(path: &Path) -> Result<(), OutputError> {
-    let is_page = match std::fs::metadata(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => true,
-        Err(error) => return Err(OutputError::io("look at", path)(error)),
-        // A pipe has no head until somebody writes into it.
-        Ok(entry) if !entry.is_file() => false,
-        Ok(_) => {
-            let mut head = Vec::new();
-            let file = std::fs::File::open(path).map_err(OutputError::io("read", path))?;
-            file.take(HEAD).read_to_end(&mut head).map_err(OutputError::io("read", path))?;
-            String::from_utf8_lossy(&head).contains(markup::GENERATOR)
+/// Where a path leads that a page may be written to: to nothing yet, an empty file or a page of this program, of which the head is read.
+fn place_of_page(path: &Path) -> Result<PathBuf, OutputError> {
+    let is_link = std::fs::symlink_metadata(path).is_ok_and(|entry| entry.is_symlink());
+    let entry = match std::fs::metadata(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound && is_link => {
+            return Err(OutputError::DeadLink { path: path.to_owned() });
         }
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(path.to_owned()),
+        entry => entry.map_err(OutputError::io("look at", path))?,
     };
-    if is_page { Ok(()) } else { Err(OutputError::NoPage { path: path.to_owned() }) }
+    // A pipe has no head until somebody writes into it.
+    let is_page = entry.is_file() && (entry.len() == 0 || head(path)?.contains(markup::GENERATOR));
+    match is_page {
+        true if is_link => path.canonicalize().map_err(OutputError::io("look at", path)),
+        true => Ok(path.to_owned()),
+        false => Err(OutputError::NoPage { path: path.to_owned() }),
+    }
+}
+
+/// The first letters of a file.
+fn head(path: &Path) -> Result<String, OutputError> {
+    let mut head = Vec::new();
+    let file = std::fs::File::open(path).map_err(OutputError::io("read", path))?;
+    file.take(HEAD).read_to_end(&mut head).map_err(OutputError::io("read", path))?;
+    Ok(String::from_utf8_lossy(&head).into_owned())
 }
 
 /// Whether a configuration is, to the letter, the one that a directory was made with, or one that its run may be resumed with.

@@ -2,15 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, sub};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::topology::triangle_edges;
 use fluxmorph_geometry::{Mesh, NodeId};
 
-use super::symmetry_planes::{Askew, SymmetryPlanes};
-use super::{Mirror, dominant_axis};
-
-/// Largest component of a unit normal across its axis for a symmetry plane: coordinates in files carry 6 or more digits.
-const PLANE_TOLERANCE: f64 = 1e-6;
+use super::symmetry_planes::SymmetryPlanes;
 
 type Edge = [NodeId; 2];
 
@@ -42,23 +38,15 @@ impl BoundaryEdges {
         self.free.contains(&node)
     }
 
-    /// The planes that cut the surface, each once; a point of the surface says on which side it is.
-    pub(super) fn symmetry_planes(&self, mesh: &Mesh, cuts: &[[NodeId; 3]], inside: Point) -> SymmetryPlanes {
-        let [lower, upper] = mesh.bounding_box();
-        let mut planes = SymmetryPlanes::default();
-        for triangle in cuts.iter().filter(|t| triangle_edges(**t).iter().any(|edge| self.cut.contains(edge)))
-        {
-            let vertices = triangle.map(|n| mesh.point(n));
-            let area = area_vector(vertices);
-            let axis = dominant_axis(area);
-            if (0..3).any(|d| d != axis && area[d].abs() > PLANE_TOLERANCE * norm(area)) {
-                let normal = area.map(|c| c / norm(area));
-                planes.add_askew(Askew::new(normal, centroid(vertices), inside), norm(sub(upper, lower)));
-            } else {
-                let at = centroid(vertices)[axis];
-                planes.add_aligned(Mirror { axis, at }, PLANE_TOLERANCE * (upper[axis] - lower[axis]));
-            }
-        }
-        planes.settled(inside)
+    /// The planes that cut the surface with nodes at these places.
+    pub(super) fn symmetry_planes(
+        &self,
+        mesh: &Mesh,
+        cuts: &[[NodeId; 3]],
+        places: &[Point],
+    ) -> SymmetryPlanes {
+        let inside = std::array::from_fn(|d| places.iter().map(|x| x[d]).sum::<f64>() / places.len() as f64);
+        let touches = |t: &&[NodeId; 3]| triangle_edges(**t).iter().any(|edge| self.cut.contains(edge));
+        SymmetryPlanes::new(mesh, cuts.iter().filter(touches), inside)
     }
 }

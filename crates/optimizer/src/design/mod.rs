@@ -228,9 +228,7 @@ impl DesignSurface {
             Control::Filter(radius) => {
                 let mut surface = filter::Surface::new(mesh, &nodes, &setup.triangles, &directions);
                 surface.mirror_areas(&pairs);
-                let inside =
-                    std::array::from_fn(|d| places.iter().map(|x| x[d]).sum::<f64>() / places.len() as f64);
-                let rows = surface.rows(radius, &edges.symmetry_planes(mesh, &setup.cuts, inside))?;
+                let rows = surface.rows(radius, &edges.symmetry_planes(mesh, &setup.cuts, &places))?;
                 (rows, places, symmetry::groups(nodes.len(), &pairs))
             }
             Control::Grid(counts) => {

@@ -16,8 +16,9 @@ use super::{DesignError, DesignSurface, Mirror, Row, axis_name};
 /// more digits, and nodes lie much further apart.
 const TOLERANCE: f64 = 1e-6;
 
-/// Largest difference of two displacements that are alike, for a design of numbers up to 1.
-const ALIKE: f64 = 1e-9;
+/// Largest difference of two displacements that are alike, for a design of numbers up to 1: what partners that are slightly off their
+/// images see less of each other through a filter.
+const ALIKE: f64 = 1e-4;
 
 /// Largest component of a unit direction across a mirror: the rounding of the digits of a configuration.
 const OBLIQUE: f64 = 1e-9;
@@ -47,14 +48,17 @@ pub(super) fn pairs(
     mirrors.iter().map(|mirror| points.iter().map(|&point| partner(mirror, point)).collect()).collect()
 }
 
-/// How many edges of a surface do not move as their mirror images do, where the nodes do: the surface is symmetric in its nodes alone,
-/// and not between them. An edge that is none on the other side has the edge through its mirrored middle as image, as where two cells
+/// How many edges of a surface have no mirror image that moves as they do: the surface is symmetric in its nodes at most, and not between
+/// them. An edge that is none on the other side has the edge through its mirrored middle as image, as where two cells
 /// are cut along different diagonals, and moves like it where the quadrilateral of both stays plane.
 pub fn edges_without_image(
     mesh: &Mesh,
     (surface, triangles): (&DesignSurface, &[[NodeId; 3]]),
     mirrors: &[Mirror],
 ) -> usize {
+    if mirrors.is_empty() {
+        return 0;
+    }
     let edges: BTreeSet<[NodeId; 2]> = triangles.iter().flat_map(|t| triangle_edges(*t)).collect();
     let edges: Vec<[NodeId; 2]> = edges.into_iter().collect();
     let design: Vec<f64> = (0..surface.variable_count()).map(|k| (k as f64).sin()).collect();

@@ -414,14 +414,45 @@ fn a_filter_on_an_eighth_gives_the_surface_of_the_quarter() {
     }
 }
 
-/// Facets of a wall that is round meet at angles that no device with symmetry planes has.
+/// Facets of a wall that is round are no planes of a device; beside them the planes of a wedge are, with the digits of a file.
 #[test]
 fn the_facets_of_a_curved_wall_have_no_images() {
-    let bent = |x: Point| [x[0] - 0.1 * (3.0 * x[1]).sin(), x[1], x[2]];
-    let mesh = moved_block(6, bent);
-    let both = quarter(&mesh, UP, Control::Filter(0.4));
-    let straight = DesignSetup { cuts: outward(&mesh, "y_min"), ..both.clone() };
-    assert_eq!(build(&mesh, &both).rows(), build(&mesh, &straight).rows());
+    let angle = (180.0_f64 / 7.0).to_radians();
+    let rounded = |x: f64| (1e7 * x).round() / 1e7;
+    // A seventh of half a disc from the axis on, its round end at x_max.
+    let wedge = |x: Point| {
+        let (sin, cos) = (angle * x[1]).sin_cos();
+        [x[0] * cos, x[0] * sin, x[2]].map(rounded)
+    };
+    let whole = block(&BlockParameters { size: [1.0; 3], cells: [6, 6, 2] }).expect("a block");
+    let off_axis = |x: Point| wedge([0.02 + x[0], x[1], x[2]]);
+    let mesh = Mesh::new(Arc::clone(whole.topology()), whole.points().iter().map(|&x| off_axis(x)).collect())
+        .expect("no element is inverted");
+    let of = |walls: &[&str]| {
+        let cuts: Vec<_> = walls.iter().flat_map(|name| outward(&mesh, name)).collect();
+        let setup = DesignSetup { cuts, ..quarter(&mesh, UP, Control::Filter(0.4)) };
+        build(&mesh, &setup)
+    };
+    let [alone, beside] = [of(&["y_min", "y_max"]), of(&["y_min", "y_max", "x_max"])];
+    assert_eq!(alone.rows(), beside.rows());
+    assert_eq!(of(&["y_min", "x_max"]).rows(), of(&["y_min"]).rows());
+    // Heights of a round device are the same on both planes but for the diagonals of the cells; without images they are not.
+    let heights = |surface: &DesignSurface| {
+        let height = surface.normal_displacements(&values(surface, |x| x[0].hypot(x[1])));
+        let at = |angle: f64| {
+            let on = |&(k, n): &(usize, &NodeId)| {
+                let x = mesh.point(*n);
+                (x[1].atan2(x[0]) - angle).abs() < 1e-5 && height[k] != 0.0
+            };
+            surface.nodes().iter().enumerate().filter(on).map(|(k, _)| height[k]).collect::<Vec<_>>()
+        };
+        let [lower, upper] = [at(0.0), at(angle)];
+        assert_eq!((lower.len(), upper.len()), (7, 7));
+        lower.iter().zip(upper).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let [with, without] = [heights(&alone), heights(&of(&[]))];
+    println!("{with:.1e} with images, {without:.1e} without");
+    assert!(with < 0.2 * without, "{with} {without}");
 }
 
 /// The cells of a block are all cut along one diagonal: the heights of a grid that are the same across the mirror leave no trace of it.

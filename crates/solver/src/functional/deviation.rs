@@ -9,6 +9,7 @@
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::centroid;
 use fluxmorph_geometry::{ElementId, Mesh};
+use rayon::prelude::*;
 
 use super::{Functional, MultipoleFunctional, Observation};
 use crate::Order;
@@ -54,8 +55,9 @@ fn of_expansion(
     solution: &FieldSolution,
 ) -> Vec<(ElementId, f64)> {
     let Some(main) = functional.main_field(model, mesh, solution) else { return Vec::new() };
-    let inside = mesh.topology().elements().filter(|&e| main.domain().meets(mesh.vertices(e)));
-    let at = |e| {
+    let inside: Vec<ElementId> =
+        mesh.topology().elements().filter(|&e| main.domain().meets(mesh.vertices(e))).collect();
+    let at = |&e: &ElementId| {
         let middle = centroid(mesh.vertices(e));
         let b = match model.setup().order {
             Order::Linear => RecoveredPoint::new(model, mesh, e, middle).flux_density(solution, model, mesh),
@@ -64,7 +66,7 @@ fn of_expansion(
         let left = main.remainder(middle, b);
         (e, if model.angular_frequency() == 0.0 { signed(left) } else { size(left) })
     };
-    inside.map(at).collect()
+    inside.par_iter().map(at).collect()
 }
 
 /// The one component that is compared with its sign, or the size of a vector.

@@ -109,7 +109,7 @@ pub struct LinearSolverSettings {
     /// Relative residual at which the iteration stops [1]. Default 1e-11: two digits below what is required, so that
     /// differences of objectives in a gradient check are not noise.
     pub tolerance: f64,
-    /// Relative true residual above which a solution is refused [1]. Default 1e-9.
+    /// Relative true residual above which a solution is refused [1], unless it is rounding (`rounding`). Default 1e-9.
     pub required: f64,
     /// Iterations after which the method gives up. Default: ten times what a sound system needs.
     pub max_iterations: Option<usize>,

@@ -5,7 +5,7 @@
 //! more of the load than is asked of a residual, while the field is exact to ten digits.
 
 use fluxmorph_geometry::fem::scalar::ordered_sum;
-use fluxmorph_geometry::fem::{CsrMatrix, c64, dot, norm};
+use fluxmorph_geometry::fem::{CsrMatrix, c64, norm};
 
 /// Of the required residual, what a solution that ends at rounding may be wrong by, in the norm of the energy.
 const UNSEEN: f64 = 100.0;
@@ -23,10 +23,11 @@ pub(crate) struct Left<'a> {
 
 impl Left<'_> {
     /// Whether the residual is below what a double holds of the products, `ε |(|b| + |K| |x|)|` (a sixth of it is usual), and a step
-    /// has no share of the energy, `|rᵀ K⁻¹ r| ≤ (UNSEEN · required)² |bᵀ x|`.
+    /// has no share of the energy, `|rᴴ K⁻¹ r| ≤ (UNSEEN · required)² |bᴴ x|`: neither vanishes but with the field, where real and
+    /// imaginary part of `K` are semidefinite.
     pub(crate) fn is_rounding(&self, required: f64) -> bool {
-        let [left, all] =
-            [dot(self.residual, self.step), dot(self.load, self.solution)].map(|energy| energy.norm());
+        let product = |a: &[c64], b: &[c64]| ordered_sum(a.len(), |i| a[i].conj() * b[i]).norm();
+        let (left, all) = (product(self.residual, self.step), product(self.load, self.solution));
         left <= (UNSEEN * required).powi(2) * all && norm(self.residual) <= f64::EPSILON * self.products()
     }
 

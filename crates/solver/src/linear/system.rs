@@ -407,7 +407,8 @@ impl LocalSystem {
 
     /// Whether what the last method of all leaves is the rounding of `K x` alone.
     fn is_solved_but_for_rounding(&self, right_side: &[c64], x: &[c64]) -> bool {
-        let own = self.preconditioner.as_ref().filter(|own| own.method == Method::Direct);
+        let is_last = |method: Method| method.is_complete() && self.analysis.more_robust(method).is_none();
+        let own = self.preconditioner.as_ref().filter(|own| is_last(own.method));
         let Some(factor) = own.filter(|_| self.origin == Origin::Own) else { return false };
         let residual = self.residual(right_side, x);
         let mut step = vec![c64::default(); x.len()];
