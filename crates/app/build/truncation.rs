@@ -150,8 +150,8 @@ impl Truncation {
         let ratio = distance_m / source_size_m;
         (ratio < *near).then(|| {
             format!(
-                "the wall {} is {:.3} mm from the box around coils, matter and what is observed, {ratio:.1} times their half diagonal: where it stands \
-                 for open space, no error bar counts what it cuts off; walls farther off show how much that is",
+                "the wall {} is {:.3} mm from the box around coils, matter and what is observed, {ratio:.1} times their half \
+                 diagonal: where it stands for open space, no error bar counts what it cuts off; walls farther off show how much that is",
                 self.named("`"),
                 Millimetres(*distance_m)
             )
