@@ -24,7 +24,7 @@ use fluxmorph_geometry::fem::scalar::ordered_sum;
 use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 
-use super::symmetry_planes::SymmetryPlanes;
+use super::symmetry_planes::{Seen, SymmetryPlanes};
 use super::{DesignError, Row};
 
 /// Most entries of the filter matrix: 0.8 GB.
@@ -56,13 +56,6 @@ pub(super) struct Surface<'a> {
     areas: Vec<f64>,
     /// The least node of the connected piece.
     piece: Vec<usize>,
-}
-
-/// A node or one of its mirror images.
-struct Seen {
-    node: usize,
-    place: Point,
-    direction: Point,
 }
 
 impl<'a> Surface<'a> {
@@ -98,8 +91,8 @@ impl<'a> Surface<'a> {
     pub(super) fn rows(&self, radius: f64, planes: &SymmetryPlanes) -> Result<Vec<Row>, DesignError> {
         let cell = |x: Point| x.map(|c| (c / radius).floor() as i64);
         let mut cells: BTreeMap<[i64; 3], Vec<Seen>> = BTreeMap::new();
-        for (node, place, direction) in planes.with_images(&self.places, self.directions, radius) {
-            cells.entry(cell(place)).or_default().push(Seen { node, place, direction });
+        for seen in planes.with_images(&self.places, self.directions, radius) {
+            cells.entry(cell(seen.place)).or_default().push(seen);
         }
         let mut entries = 0;
         let mut rows = Vec::with_capacity(self.places.len());

@@ -5,7 +5,7 @@
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::box_tree::BoxTree;
+use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_geometry::topology::triangle_edges;
 use fluxmorph_geometry::{Mesh, NodeId};
@@ -32,9 +32,7 @@ pub(super) fn pairs(
     points: &[Point],
     mirrors: &[Mirror],
 ) -> Result<Vec<Vec<usize>>, DesignError> {
-    let [low, high] = bounds(points);
-    let extent = sub(high, low).into_iter().fold(0.0, f64::max);
-    let tolerance = TOLERANCE * extent;
+    let tolerance = TOLERANCE * AxisBox::around(points).extent();
     let tree = BoxTree::of_points(points);
     let partner = |mirror: &Mirror, point: Point| {
         let (i, square) = tree.nearest(mirror.image(point)).unwrap_or((0, f64::INFINITY));
@@ -67,22 +65,15 @@ pub fn edges_without_image(
     let sum = |[a, b]: [Point; 2]| -> Point { std::array::from_fn(|d| a[d] + b[d]) };
     let middles: Vec<Point> =
         edges.iter().map(|edge| sum(edge.map(|n| mesh.point(n))).map(|c| 0.5 * c)).collect();
-    let [low, high] = bounds(&middles);
+    let around = AxisBox::around(&middles);
+    let tolerance = TOLERANCE * norm(sub(around.upper, around.lower));
     let tree = BoxTree::of_points(&middles);
     let moves_alike = |mirror: &Mirror, k: usize| {
         let Some((image, square)) = tree.nearest(mirror.image(middles[k])) else { return false };
         let [own, other] = [k, image].map(|k| sum(edges[k].map(of_node)));
-        square.sqrt() <= TOLERANCE * norm(sub(high, low)) && norm(sub(mirror.reflect(own), other)) < ALIKE
+        square.sqrt() <= tolerance && norm(sub(mirror.reflect(own), other)) < ALIKE
     };
     (0..edges.len()).filter(|&k| !mirrors.iter().all(|mirror| moves_alike(mirror, k))).count()
-}
-
-/// The box around points.
-fn bounds(points: &[Point]) -> [Point; 2] {
-    let of = |start: f64, pick: fn(f64, f64) -> f64| {
-        std::array::from_fn(|d| points.iter().fold(start, |bound, x| pick(bound, x[d])))
-    };
-    [of(f64::INFINITY, f64::min), of(f64::NEG_INFINITY, f64::max)]
 }
 
 /// Checks that one direction for all nodes is in every mirror plane.

@@ -8,6 +8,8 @@
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 
+use fluxmorph_geometry::box_tree::AxisBox;
+use fluxmorph_geometry::curved::SMOOTH;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId};
 
@@ -18,9 +20,6 @@ const ALIGNED: f64 = 1e-6;
 
 /// Largest distance of a node from a plane that it is on, in parts of the mesh's size: a plane is known by its largest triangle.
 const ON_PLANE: f64 = 1e-4;
-
-/// Least cosine between the normals of two facets of a wall that is round: those of 42 degrees, as of faces that go on in each other.
-const SHALLOW: f64 = 0.743;
 
 /// Largest deviation of the angle between two planes from one that divides 180 degrees [rad].
 const ANGLE_TOLERANCE: f64 = 2e-4;
@@ -79,6 +78,16 @@ pub(super) struct SymmetryPlanes {
     askew: Vec<Askew>,
 }
 
+/// A node of the surface or one of its images.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seen {
+    pub(super) node: usize,
+    /// [m]
+    pub(super) place: Point,
+    /// In which it moves.
+    pub(super) direction: Point,
+}
+
 /// Triangles in one plane askew.
 struct Wall {
     plane: Askew,
@@ -107,6 +116,12 @@ impl Isometry {
     fn of_point(&self, x: Point) -> Point {
         let turned = self.of_vector(x);
         std::array::from_fn(|d| turned[d] + self.shift[d])
+    }
+
+    /// What it makes of a node.
+    fn of(&self, seen: &Seen) -> Seen {
+        let &Seen { node, place, direction } = seen;
+        Seen { node, place: self.of_point(place), direction: self.of_vector(direction) }
     }
 
     /// The reflection of this image in a plane.
@@ -165,14 +180,11 @@ impl SymmetryPlanes {
         Self { aligned, askew }
     }
 
-    /// Points and vectors with their images, as far as a point comes within a distance [m] of the others: `(number, point, vector)`.
-    pub(super) fn with_images(
-        &self,
-        places: &[Point],
-        vectors: &[Point],
-        distance: f64,
-    ) -> Vec<(usize, Point, Point)> {
-        let own: Vec<_> = (0..places.len()).map(|i| (i, places[i], vectors[i])).collect();
+    /// All nodes, and their images as far as one comes within a distance [m] of the others.
+    pub(super) fn with_images(&self, places: &[Point], directions: &[Point], distance: f64) -> Vec<Seen> {
+        let own: Vec<Seen> = (0..places.len())
+            .map(|node| Seen { node, place: places[node], direction: directions[node] })
+            .collect();
         if self.askew.is_empty() {
             return self.aligned_images(own, distance);
         }
@@ -180,16 +192,14 @@ impl SymmetryPlanes {
     }
 
     /// In the planes within the distance, at most one plane an axis at a time.
-    fn aligned_images(
-        &self,
-        mut all: Vec<(usize, Point, Point)>,
-        distance: f64,
-    ) -> Vec<(usize, Point, Point)> {
+    fn aligned_images(&self, mut all: Vec<Seen>, distance: f64) -> Vec<Seen> {
         for axis in 0..3 {
             let mut images = Vec::new();
             for plane in self.aligned.iter().filter(|plane| plane.axis == axis) {
-                let near = all.iter().filter(|(_, place, _)| (place[axis] - plane.at).abs() < distance);
-                images.extend(near.map(|&(i, place, v)| (i, plane.image(place), plane.reflect(v))));
+                for seen in all.iter().filter(|seen| (seen.place[axis] - plane.at).abs() < distance) {
+                    let (place, direction) = (plane.image(seen.place), plane.reflect(seen.direction));
+                    images.push(Seen { node: seen.node, place, direction });
+                }
             }
             all.extend(images);
         }
@@ -197,12 +207,11 @@ impl SymmetryPlanes {
     }
 
     /// Every product of the reflections that brings a point near the box around all; `None` where there are too many.
-    fn images(&self, own: &[(usize, Point, Point)], distance: f64) -> Option<Vec<(usize, Point, Point)>> {
-        let end = |d: usize, of: fn(f64, f64) -> f64| own.iter().map(|(_, x, _)| x[d]).reduce(of);
-        let bound = |of: fn(f64, f64) -> f64| std::array::from_fn(|d| end(d, of).unwrap_or_default());
-        let [low, high]: [Point; 2] = [bound(f64::min), bound(f64::max)];
-        let is_near = |x: Point| (0..3).all(|d| x[d] > low[d] - distance && x[d] < high[d] + distance);
-        let (centre, size) = (std::array::from_fn(|d| 0.5 * (low[d] + high[d])), norm(sub(high, low)));
+    fn images(&self, own: &[Seen], distance: f64) -> Option<Vec<Seen>> {
+        let around = AxisBox::around(&own.iter().map(|seen| seen.place).collect::<Vec<_>>());
+        let AxisBox { lower, upper } = around;
+        let (centre, size) = (std::array::from_fn(|d| 0.5 * (lower[d] + upper[d])), norm(sub(upper, lower)));
+        let near = around.grown(distance);
         let aligned = self.aligned.iter().map(|plane| Askew::aligned(plane, centre));
         let planes: Vec<Askew> = aligned.chain(self.askew.iter().copied()).collect();
         let mut isometries = vec![Isometry::IDENTITY];
@@ -215,8 +224,7 @@ impl SymmetryPlanes {
                     continue;
                 }
                 let before = all.len();
-                let of = |&(i, x, v): &_| (i, image.of_point(x), image.of_vector(v));
-                all.extend(own.iter().map(of).filter(|(_, x, _)| is_near(*x)));
+                all.extend(own.iter().map(|seen| image.of(seen)).filter(|seen| near.contains(seen.place)));
                 if all.len() > before {
                     isometries.push(image);
                 }
@@ -263,7 +271,7 @@ fn walls<'t>(
 /// The planes of walls that are none of one that is round, the largest first.
 fn flat(walls: Vec<Wall>, inside: Point) -> Vec<Askew> {
     let goes_on =
-        |a: &Wall, b: &Wall| dot(a.plane.normal, b.plane.normal) > SHALLOW && !a.nodes.is_disjoint(&b.nodes);
+        |a: &Wall, b: &Wall| dot(a.plane.normal, b.plane.normal) > SMOOTH && !a.nodes.is_disjoint(&b.nodes);
     let is_flat = |k: usize| (0..walls.len()).all(|other| other == k || !goes_on(&walls[k], &walls[other]));
     let mut planes: Vec<(f64, Askew)> = (0..walls.len())
         .filter(|&k| is_flat(k))
