@@ -17,7 +17,7 @@ use crate::element::volume::Coefficients;
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::family::{self, Local, Matrices};
-use crate::linear::aggregation;
+use crate::linear::{aggregation, hats};
 use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, components, injection, prolongation};
 use crate::rotated::RotatedMatrix;
@@ -182,7 +182,7 @@ impl Discretisation {
     }
 
     /// The prolongation from a coarse space: linear elements for quadratic ones, joined to aggregates where there are many and the
-    /// tolerance is rough; for linear ones ψ in full and aggregates of `A`, by the couplings of `matrix`.
+    /// tolerance is rough; for linear ones ψ in full and aggregates of `A`, by the couplings of `matrix`, and around iron hat functions.
     ///
     /// # Errors
     /// As [`Unknowns::new`]; [`SolverError::Parameter`] for first-order edge elements, which have none.
@@ -215,7 +215,14 @@ impl Discretisation {
                 linear
             });
         }
-        Ok(aggregation::prolongation(&self.unknowns.dofs, matrix, aggregation::PASSES))
+        let dofs = &self.unknowns.dofs;
+        let all: Vec<u32> = (0..dofs.count() as u32).collect();
+        let aggregates = |passes| aggregation::aggregates(dofs, &all, matrix, passes);
+        Ok(if weak_form.contrast() >= hats::CONTRAST {
+            hats::prolongation(dofs, mesh.points(), &aggregates(aggregation::PASSES_BESIDE_HATS))
+        } else {
+            aggregation::prolongation(aggregates(aggregation::PASSES))
+        })
     }
 
     /// The coarse space of the rows of this rank, by the couplings of their matrix; linear nodal elements alone have one.

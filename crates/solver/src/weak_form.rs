@@ -101,6 +101,14 @@ impl WeakForm {
         &self.coefficients[self.topology.region_of()[e.index()].index()]
     }
 
+    /// The largest reluctivity of an element over the smallest.
+    pub(crate) fn contrast(&self) -> f64 {
+        let reluctivities = self.topology.elements().map(|e| self.coefficients_of(e).reluctivity);
+        let wider = |(least, most): (f64, f64), nu: f64| (least.min(nu), most.max(nu));
+        let (least, most) = reluctivities.fold((f64::INFINITY, 0.0), wider);
+        most / least
+    }
+
     /// Whether eddy currents flow in an element, so that it has ψ.
     pub(crate) fn conducts(&self, e: ElementId) -> bool {
         self.coefficients_of(e).eddy != c64::default()

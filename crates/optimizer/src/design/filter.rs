@@ -34,6 +34,10 @@ const LARGEST: usize = 50_000_000;
 /// designs of two cells are still seen. With it rails carry 20 of 20 random designs (docs/torture.md).
 const CELLS: f64 = 1.5;
 
+/// Cosine of the angle up to which directions are of one side, 87 degrees: faces that meet at right angles are not, with the digits of
+/// any file and however the device is turned.
+const ONE_SIDE: f64 = 0.05;
+
 /// Size of a cell of a surface [m]: the mean over its area of the side of a square that two triangles would fill.
 ///
 /// Fine strips beside edges have little area, and hardly count.
@@ -112,7 +116,7 @@ impl<'a> Surface<'a> {
         for seen in near.filter(|seen| self.piece[seen.node] == self.piece[i]) {
             let weight = 1.0 - norm(sub(seen.place, self.places[i])) / radius;
             let itself = seen.node == i && seen.place == self.places[i];
-            if weight > 0.0 && (itself || dot(seen.direction, self.directions[i]) > 0.0) {
+            if weight > 0.0 && (itself || is_one_side(seen.direction, self.directions[i])) {
                 *weights.entry(seen.node).or_default() += weight * self.areas[seen.node];
             }
         }
@@ -120,6 +124,11 @@ impl<'a> Surface<'a> {
         // Only triangles without area give none: the node then follows its own variable.
         if sum > 0.0 { weights.into_iter().map(|(j, w)| (j, w / sum)).collect() } else { vec![(i, 1.0)] }
     }
+}
+
+/// Whether nodes with these directions move to one side.
+fn is_one_side(a: Point, b: Point) -> bool {
+    dot(a, b) > ONE_SIDE * norm(a) * norm(b)
 }
 
 /// A cell and those around it, in order.

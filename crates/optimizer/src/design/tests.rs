@@ -387,6 +387,32 @@ fn a_filter_sees_the_images_in_planes_askew_as_in_those_of_the_axes() {
     }
 }
 
+/// The product of directions at right angles is rounding once the block is turned.
+#[test]
+fn faces_at_right_angles_do_not_mix_however_a_block_is_turned() {
+    let turned = |angle: f64| {
+        let mesh = moved_block(5, |x| {
+            let (sin, cos) = angle.sin_cos();
+            let [x, y, z] = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]];
+            [x, cos * y - sin * z, sin * y + cos * z]
+        });
+        let faces: Vec<_> =
+            ["x_max", "y_max", "z_max"].iter().flat_map(|face| outward(&mesh, face)).collect();
+        let setup = DesignSetup::new(&faces, Direction::Normal);
+        build(&mesh, &DesignSetup { control: Control::Filter(0.7), ..setup })
+    };
+    let upright = turned(0.0);
+    for angle in [1e-7, 0.5, std::f64::consts::FRAC_PI_2, 2.1] {
+        for (own, other) in upright.rows().iter().zip(turned(angle).rows()) {
+            let (nodes, others): (Vec<_>, Vec<_>) =
+                (own.iter().map(|e| e.0).collect(), other.iter().map(|e| e.0).collect());
+            assert_eq!(nodes, others, "turned by {angle}");
+            let off = own.iter().zip(other).map(|(a, b)| (a.1 - b.1).abs()).fold(0.0, f64::max);
+            assert!(off < 1e-12, "turned by {angle}: {off}");
+        }
+    }
+}
+
 /// Half of a quarter, below the diagonal, over which the triangles of a block are mirror images: images of images are the other
 /// quarters.
 #[test]

@@ -25,6 +25,9 @@ use crate::unknowns::PSI;
 /// 2.7 times as long for the coarse factor; one more takes half as many iterations again.
 pub(crate) const PASSES: usize = 3;
 
+/// The same beside hat functions: 32 unknowns an aggregate.
+pub(crate) const PASSES_BESIDE_HATS: usize = 5;
+
 /// Passes of pairing of the linear functions of quadratic elements: four an aggregate.
 const PASSES_OF_LINEAR_FUNCTIONS: usize = 2;
 
@@ -37,15 +40,12 @@ const NONE: u32 = u32::MAX;
 /// Couplings of every aggregate with the others, by number, `(other, −Re)`.
 type Graph = Vec<Vec<(u32, f64)>>;
 
-/// The prolongation from the coarse space; shape `(dofs.count(), n_coarse)`, one entry 1 a row.
-///
-/// The couplings are those of `matrix`: the coarse space is made once, on the reference mesh.
-pub(crate) fn prolongation(dofs: &DofMap<4>, matrix: &CsrMatrix<c64>, passes: usize) -> CsrMatrix<f64> {
-    let n = dofs.count() as u32;
-    let all: Vec<u32> = (0..n).collect();
-    let Aggregates { of_row: columns, count } = aggregates(dofs, &all, matrix, passes);
-    let structure = CsrStructure { column_count: count, row_starts: (0..=n).collect(), columns };
-    CsrMatrix { structure: Arc::new(structure), values: vec![1.0; n as usize] }
+/// The prolongation from aggregates of all rows: one entry 1 a row.
+pub(crate) fn prolongation(aggregates: Aggregates) -> CsrMatrix<f64> {
+    let Aggregates { of_row: columns, count: column_count } = aggregates;
+    let rows = columns.len() as u32;
+    let structure = CsrStructure { column_count, row_starts: (0..=rows).collect(), columns };
+    CsrMatrix { structure: Arc::new(structure), values: vec![1.0; rows as usize] }
 }
 
 /// The aggregate of every row of `matrix`, which are those of the equations `owned`; its columns are all equations, of which
@@ -175,9 +175,10 @@ mod tests {
         let entry = |i, c| (c, c64::new(if c == i { 2.0 } else { -1.0 }, 0.0));
         let row = |i: usize| (i.saturating_sub(1)..(i + 2).min(n)).map(|c| entry(i, c)).collect();
         let matrix = CsrMatrix::from_rows(n, (0..n).map(row));
-        let p = prolongation(&dofs, &matrix, 2);
-        assert_eq!(p.structure.columns, [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 4, 5, 6]);
-        assert_eq!(p.structure.column_count, 7);
+        let all: Vec<u32> = (0..n as u32).collect();
+        let aggregates = aggregates(&dofs, &all, &matrix, 2);
+        assert_eq!(aggregates.of_row, [0, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 4, 5, 6]);
+        assert_eq!(aggregates.count, 7);
     }
 
     /// The same column over two ranks, which own every node of a half, and 5 besides the second.

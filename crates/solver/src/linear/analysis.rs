@@ -9,7 +9,9 @@ use fluxmorph_geometry::fem::{
     Changes, CsrMatrix, Hosts, IncompleteAnalysis, LdltAnalysis, c64, kept_first, lifted_dissection, ordering,
 };
 
-use super::cost::{Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, typical_iterations};
+use super::cost::{
+    Costs, MATRIX_ENTRY, SINGLE_ENTRY, Service, Sizes, iterations_with_hats, typical_iterations,
+};
 use super::method::{FieldKind, LinearSolver, LinearSolverSettings, Method, Reuse};
 use super::two_level::{self, TwoLevelAnalysis};
 use crate::elements::{ElementFamily, Order};
@@ -247,7 +249,11 @@ impl SystemAnalysis {
 
     /// Iterations to expect of a method with a factor of the matrix itself.
     pub(super) fn typical_iterations(&self, method: Method) -> usize {
-        typical_iterations(method, self.field, self.elements, self.structure.row_count())
+        let unknowns = self.structure.row_count();
+        match &self.two_level {
+            Some(levels) if method == Method::TwoLevel && levels.has_hats() => iterations_with_hats(unknowns),
+            _ => typical_iterations(method, self.field, self.elements, unknowns),
+        }
     }
 
     /// Ordering and symbolic factor.

@@ -16,6 +16,7 @@ pub mod distributed;
 mod factor;
 mod gauss_seidel;
 pub(crate) mod gmres;
+pub(crate) mod hats;
 mod method;
 mod preconditioner;
 mod prepared;

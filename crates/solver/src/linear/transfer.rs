@@ -1,10 +1,11 @@
 //! A transfer between two levels: prolongation, restriction, the Galerkin product `Pᵀ K P`, and the half of it `Pᵀ K`.
 
+use std::ops::Mul;
 use std::slice;
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::csr::CsrStructure;
-use fluxmorph_geometry::fem::{CsrMatrix, Scalar, c32, c64};
+use fluxmorph_geometry::fem::{CsrMatrix, Scalar, c64};
 use fluxmorph_geometry::parallel::Aggregates;
 use rayon::prelude::*;
 
@@ -38,6 +39,12 @@ impl Transfer {
             _ => false,
         };
         (0..p.row_count()).map(alone).collect()
+    }
+
+    /// Which coarse unknowns have shares of unknowns.
+    pub(crate) fn has_shares(&self) -> Vec<bool> {
+        let CsrMatrix { structure, values } = &self.restriction;
+        (0..structure.row_count()).map(|row| values[structure.row(row)].iter().any(|&w| w != 1.0)).collect()
     }
 
     /// The prolongation from aggregates of coarse unknowns, which count as equal.
@@ -87,12 +94,19 @@ impl Transfer {
     /// The structure of `Pᵀ K P` for a matrix with the structure `fine`.
     pub(crate) fn coarse_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
         let p = &self.prolongation.structure;
-        self.product_structure(fine, self.coarse_count(), |&g| &p.columns[p.row(g as usize)])
+        let parents = |g: &u32| &p.columns[p.row(*g as usize)];
+        product_structure(&self.restriction.structure, fine, (self.coarse_count(), parents))
     }
 
     /// The structure of `Pᵀ K`.
     pub(crate) fn restricted_structure(&self, fine: &CsrStructure) -> Arc<CsrStructure> {
-        self.product_structure(fine, fine.column_count, slice::from_ref)
+        product_structure(&self.restriction.structure, fine, (fine.column_count, slice::from_ref))
+    }
+
+    /// The structure of `Pᵀ K P`, from that of `Pᵀ K`.
+    pub(crate) fn structure_of_restricted(&self, restricted: &CsrStructure) -> Arc<CsrStructure> {
+        let columns = (self.coarse_count(), slice::from_ref);
+        product_structure(restricted, &self.prolongation.structure, columns)
     }
 
     /// `Pᵀ K P`, with the structure of [`Self::coarse_structure`]; every entry is summed in the order of the fine rows.
@@ -102,101 +116,107 @@ impl Transfer {
         fine: &CsrMatrix<c64>,
     ) -> CsrMatrix<c64> {
         let p = &self.prolongation;
-        let parents = |&g: &u32| {
-            let range = p.structure.row(g as usize);
+        let parents = |g: &u32| {
+            let range = p.structure.row(*g as usize);
             (&p.values[range.clone()], &p.structure.columns[range])
         };
-        self.product(structure, fine, parents, |sum| sum)
+        product(structure, &self.restriction, fine, parents)
     }
 
-    /// `Pᵀ K` in single precision, with the structure of [`Self::restricted_structure`].
+    /// `Pᵀ K`, with the structure of [`Self::restricted_structure`].
     pub(crate) fn restricted_matrix(
         &self,
         structure: &Arc<CsrStructure>,
         fine: &CsrMatrix<c64>,
-    ) -> CsrMatrix<c32> {
-        let single = |sum: c64| c32::new(sum.re as f32, sum.im as f32);
-        self.product(structure, fine, |g| (&[1.0], slice::from_ref(g)), single)
+    ) -> CsrMatrix<c64> {
+        product(structure, &self.restriction, fine, itself)
     }
 
-    /// The structure of `Pᵀ K Q`, with so many columns, for the columns of the rows of `Q`.
-    fn product_structure<'q>(
-        &'q self,
-        fine: &'q CsrStructure,
-        column_count: usize,
-        columns_of: impl Fn(&'q u32) -> &'q [u32] + Sync,
-    ) -> Arc<CsrStructure> {
-        let r = &self.restriction.structure;
-        let columns_of_row = |seen: &mut Vec<u32>, row: usize| {
-            let mut found = Vec::new();
-            for &f in &r.columns[r.row(row)] {
-                for g in &fine.columns[fine.row(f as usize)] {
-                    for &c in columns_of(g) {
-                        if seen[c as usize] != row as u32 {
-                            seen[c as usize] = row as u32;
-                            found.push(c);
-                        }
-                    }
-                }
-            }
-            found.sort_unstable();
-            found
-        };
-        let rows: Vec<Vec<u32>> = (0..r.row_count())
-            .into_par_iter()
-            .with_min_len(ROWS)
-            .map_init(|| vec![u32::MAX; column_count], columns_of_row)
-            .collect();
-        let mut row_starts = vec![0u32];
-        let mut columns = Vec::with_capacity(rows.iter().map(Vec::len).sum());
-        for row in rows {
-            columns.extend(row);
-            row_starts.push(columns.len() as u32);
-        }
-        Arc::new(CsrStructure { column_count, row_starts, columns })
-    }
-
-    /// `Pᵀ K Q` for the weights and columns of the rows of `Q`, stored as `store` says.
-    fn product<'q, T: Scalar>(
-        &'q self,
+    /// `Pᵀ K P` from `Pᵀ K`, with the structure of [`Self::structure_of_restricted`]: where rows of `P` have several entries that
+    /// is less work than [`Self::coarse_matrix`], and holds `Pᵀ K`.
+    pub(crate) fn matrix_of_restricted(
+        &self,
         structure: &Arc<CsrStructure>,
-        fine: &'q CsrMatrix<c64>,
-        row_of: impl Fn(&'q u32) -> (&'q [f64], &'q [u32]) + Sync,
-        store: impl Fn(c64) -> T + Sync,
-    ) -> CsrMatrix<T> {
-        let r = &self.restriction;
-        let mut product = CsrMatrix::zeros(structure);
-        let mut rest = product.values.as_mut_slice();
-        let mut rows = Vec::with_capacity(structure.row_count());
-        for row in 0..structure.row_count() {
-            let (own, others) = rest.split_at_mut(structure.row(row).len());
-            rest = others;
-            rows.push(own);
-        }
-        let fill_row = |(place, sums): &mut (Vec<u32>, Vec<c64>), (row, values): (usize, &mut [T])| {
-            for (k, &c) in structure.columns[structure.row(row)].iter().enumerate() {
-                place[c as usize] = k as u32;
-            }
-            sums.clear();
-            sums.resize(values.len(), c64::default());
-            let terms = r.structure.row(row);
-            for (&weight, &f) in r.values[terms.clone()].iter().zip(&r.structure.columns[terms]) {
-                for k in fine.structure.row(f as usize) {
-                    let value = fine.values[k] * weight;
-                    let (weights, columns) = row_of(&fine.structure.columns[k]);
-                    for (&w, &c) in weights.iter().zip(columns) {
-                        sums[place[c as usize] as usize] += value * w;
+        restricted: &CsrMatrix<c64>,
+    ) -> CsrMatrix<c64> {
+        product(structure, restricted, &self.prolongation, itself)
+    }
+}
+
+/// The row of the identity.
+fn itself(column: &u32) -> (&[f64], &[u32]) {
+    (&[1.0], slice::from_ref(column))
+}
+
+/// The structure of `A B Q`, for the number of columns of `Q` and the columns of its rows.
+fn product_structure<'q>(
+    a: &CsrStructure,
+    b: &'q CsrStructure,
+    (column_count, columns_of): (usize, impl Fn(&'q u32) -> &'q [u32] + Sync),
+) -> Arc<CsrStructure> {
+    let columns_of_row = |seen: &mut Vec<u32>, row: usize| {
+        let mut found = Vec::new();
+        for &f in &a.columns[a.row(row)] {
+            for g in &b.columns[b.row(f as usize)] {
+                for &c in columns_of(g) {
+                    if seen[c as usize] != row as u32 {
+                        seen[c as usize] = row as u32;
+                        found.push(c);
                     }
                 }
             }
-            values.iter_mut().zip(sums).for_each(|(value, sum)| *value = store(*sum));
-        };
-        rows.into_par_iter()
-            .enumerate()
-            .with_min_len(ROWS)
-            .for_each_init(|| (vec![0u32; structure.column_count], Vec::new()), fill_row);
-        product
+        }
+        found.sort_unstable();
+        found
+    };
+    let rows: Vec<Vec<u32>> = (0..a.row_count())
+        .into_par_iter()
+        .with_min_len(ROWS)
+        .map_init(|| vec![u32::MAX; column_count], columns_of_row)
+        .collect();
+    let mut row_starts = vec![0u32];
+    let mut columns = Vec::with_capacity(rows.iter().map(Vec::len).sum());
+    for row in rows {
+        columns.extend(row);
+        row_starts.push(columns.len() as u32);
     }
+    Arc::new(CsrStructure { column_count, row_starts, columns })
+}
+
+/// `A B Q` for the weights and columns of the rows of `Q`; every entry is summed in the order of the columns of `A`.
+fn product<'q, A: Scalar + Mul<B, Output = c64>, B: Scalar>(
+    structure: &Arc<CsrStructure>,
+    a: &CsrMatrix<A>,
+    b: &'q CsrMatrix<B>,
+    row_of: impl Fn(&'q u32) -> (&'q [f64], &'q [u32]) + Sync,
+) -> CsrMatrix<c64> {
+    let mut product = CsrMatrix::zeros(structure);
+    let mut rest = product.values.as_mut_slice();
+    let mut rows = Vec::with_capacity(structure.row_count());
+    for row in 0..structure.row_count() {
+        let (own, others) = rest.split_at_mut(structure.row(row).len());
+        rest = others;
+        rows.push(own);
+    }
+    let fill_row = |place: &mut Vec<u32>, (row, sums): (usize, &mut [c64])| {
+        for (k, &c) in structure.columns[structure.row(row)].iter().enumerate() {
+            place[c as usize] = k as u32;
+        }
+        for i in a.structure.row(row) {
+            for k in b.structure.row(a.structure.columns[i] as usize) {
+                let value = a.values[i] * b.values[k];
+                let (weights, columns) = row_of(&b.structure.columns[k]);
+                for (&w, &c) in weights.iter().zip(columns) {
+                    sums[place[c as usize] as usize] += value * w;
+                }
+            }
+        }
+    };
+    rows.into_par_iter()
+        .enumerate()
+        .with_min_len(ROWS)
+        .for_each_init(|| vec![0u32; structure.column_count], fill_row);
+    product
 }
 
 fn transpose(matrix: &CsrMatrix<f64>) -> CsrMatrix<f64> {
@@ -248,10 +268,12 @@ mod tests {
         assert_eq!(coarse.entry(0, 1), Some(c64::new(-0.5, 0.0)));
         assert_eq!(coarse.entry(1, 0), coarse.entry(0, 1));
         let half = transfer.restricted_matrix(&transfer.restricted_structure(&fine.structure), &fine);
-        // The second row: (0, −1, 1 (2 + j) − 1/2, 1/2 (2 + j) − 1), exact in single precision.
-        let row = [c32::new(-1.0, 0.0), c32::new(1.5, 1.0), c32::new(0.0, 0.5)];
+        // The second row: (0, −1, 1 (2 + j) − 1/2, 1/2 (2 + j) − 1).
+        let row = [c64::new(-1.0, 0.0), c64::new(1.5, 1.0), c64::new(0.0, 0.5)];
         assert_eq!(half.structure.columns[half.structure.row(1)], [1, 2, 3]);
         assert_eq!(half.values[half.structure.row(1)], row);
+        assert_eq!(transfer.structure_of_restricted(&half.structure), structure);
+        assert_eq!(transfer.matrix_of_restricted(&structure, &half).values, coarse.values);
         let mut z = vec![c64::default(); 4];
         transfer.add_prolongation(&[c64::new(1.0, 0.0), c64::new(0.0, 2.0)], &mut z);
         assert_eq!(z[1], c64::new(0.5, 0.0));
