@@ -94,10 +94,13 @@ fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagno
         Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
         Ok(id) if is_empty(topology, id) => {
             let fault = source.diagnostic(&path, format!("the region `{name}` has no elements"));
-            faults.push(fault.expected(
-                "a region with elements; a mesh that a run has written has none where an impedance surface or a perfect conductor \
-                 stood: take the mesh that the run began with",
-            ));
+            faults.push(match config.mesh {
+                config::MeshConfig::File { .. } => fault.expected(
+                    "a region with elements; a mesh that a run has written has none where an impedance surface or a perfect \
+                     conductor stood: take the mesh that the run began with",
+                ),
+                _ => fault.expected("a region with elements; where regions overlap, the later one has them"),
+            });
         }
         Ok(_) => {}
     };

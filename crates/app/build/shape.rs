@@ -369,14 +369,17 @@ fn overlap_faults(
     let moves = |e: &ElementId| moving.binary_search(e).is_ok();
     let mut faults = Vec::new();
     for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(moves)) {
-        faults.push(
-            source
-                .diagnostic(path, "the mesh moves where the field is observed")
-                .expected(
-                    "follow = \"space\" for places that stay, follow = \"mesh\" for cells that move along",
-                )
-                .help("or take the region out of remesh.region, or shrink remesh.box"),
-        );
+        // Places of an expansion follow no cells.
+        let (follow, instead) = if path.starts_with("multipoles[") {
+            ("follow = \"space\", for places that stay", "or take a smaller radius, or take")
+        } else {
+            (
+                "follow = \"space\" for places that stay, follow = \"mesh\" for cells that move along",
+                "or take",
+            )
+        };
+        let fault = source.diagnostic(path, "the mesh moves where the field is observed").expected(follow);
+        faults.push(fault.help(format!("{instead} the region out of remesh.region, or shrink remesh.box")));
     }
     if let Some(e) = models[0].open_elements().find(moves) {
         let at = millimetres(centroid(mesh.vertices(e)));

@@ -242,7 +242,9 @@ impl Session<'_> {
         let of_best = (&best.analysis, &optimised.bounds[..]);
         let excess = self.excess_of_run(first.known(), of_best, &mut result.warnings, observer);
         self.keep_search(&mut result, observer)?;
+        let clock = Instant::now();
         let errors = self.estimate_errors(first, (best, reason), at_best, observer);
+        result.timings_s.insert("estimate".to_owned(), clock.elapsed().as_secs_f64());
         if let Some((at_initial, at_best)) = &errors {
             let errors = (at_initial, at_best);
             self.enter_estimates(&mut result, (&optimised, errors), &mut recorder, observer)?;

@@ -87,11 +87,12 @@ fn saturation(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<St
                 let is_surface = config.regions.get(&region).is_some_and(|own| own.model == RegionModel::Impedance);
                 let (part, cure) = if is_surface { ("its surface", "Mesh the region and give") } else { ("it", "Give") };
                 let (highest, place) = found.highest;
+                let weaker = if config.coils.is_empty() { "" } else { ", lower the ampere-turns" };
                 format!(
                     "iron beyond saturation: |B| in `{region}` reaches {highest:.2} T at {} Hz{under}, at {}, and \
                      {:.1} % of {part} are polarised beyond {SATURATION} T, where no iron follows the linear law of its permeability: the field is \
-                     that of a material that does not exist. {cure} the material its curve (bh), lower the ampere-turns, or \
-                     give the iron more section",
+                     that of a material that does not exist. {cure} the material its curve (bh){weaker}, or give \
+                     the iron more section",
                     Readable(frequency),
                     millimetres(place),
                     100.0 * found.beyond / found.whole

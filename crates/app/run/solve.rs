@@ -1,5 +1,7 @@
 //! One analysis with its directory: the field of a single design.
 
+use std::time::Instant;
+
 use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
 use fluxmorph_remesh::Moved;
@@ -106,7 +108,8 @@ impl Session<'_> {
         let has_initial_bounds = initial.is_none();
         let bounds = problem.bounds(initial, analysis)?;
         let mut constraints = constraints(problem, analysis, &bounds);
-        let estimate = self.estimator().estimate(analysis, observer);
+        let mut seconds = 0.0;
+        let estimate = timed(&mut seconds, || self.estimator().estimate(analysis, observer));
         if let Some(estimate) = &estimate {
             let errors = &estimate.errors;
             let at_initial = Some(errors).filter(|_| has_initial_bounds);
@@ -118,17 +121,17 @@ impl Session<'_> {
             write_field(&self.directory, self.pieces().as_ref(), 0, problem, (analysis, error))?;
             write_collection(&self.directory, &[0])?;
         }
-        let directory = &self.directory;
-        let optimum = if halvings > 0 { directory.optimum_refined() } else { directory.optimum() };
-        exports::write(config, directory, &optimum, &analysis.mesh, observer)?;
+        let optimum = if halvings > 0 { self.directory.optimum_refined() } else { self.directory.optimum() };
+        exports::write(config, &self.directory, &optimum, &analysis.mesh, observer)?;
         let initial_quality = problem.quality(problem.original()).worst;
         let left_out = LeftOut::of(problem, analysis);
         let at_initial = Some(&left_out).filter(|_| has_initial_bounds);
         let broken = left_out.broken_bounds(problem, (analysis, &bounds), at_initial);
         broken.iter().for_each(|warning| observer.warning(warning));
         let excess = left_out.of_objective(problem, analysis);
-        let (accuracy, of_facets) =
-            self.accuracy_of((analysis, halvings), (estimate.as_ref(), excess), observer);
+        let (accuracy, of_facets) = timed(&mut seconds, || {
+            self.accuracy_of((analysis, halvings), (estimate.as_ref(), excess), observer)
+        });
         let mut result = RunResult {
             evaluations: 1,
             objective: analysis.objective.map(|value| ObjectiveResult {
@@ -145,6 +148,7 @@ impl Session<'_> {
             constraints,
             ..self.result(StopReason::Done, analysis, None, initial_quality, &analysis.timings, observer)?
         };
+        result.timings_s.insert("estimate".to_owned(), seconds);
         result.warnings.extend(broken);
         if let Some(estimate) = estimate {
             result.enter_errors(&estimate.of_states);
@@ -192,4 +196,12 @@ impl Session<'_> {
         };
         (accuracy, of_states)
     }
+}
+
+/// What work gives; its time is added [s].
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
+    let clock = Instant::now();
+    let found = work();
+    *seconds += clock.elapsed().as_secs_f64();
+    found
 }

@@ -380,7 +380,8 @@ fn states(result: &RunResult) -> Vec<(String, State<'_>)> {
 fn times(result: &RunResult) -> String {
     let of = |name: &str| result.timings_s.get(name).copied().unwrap_or_default();
     let total = of("total");
-    let parts = ["setup", "remesh", "assembly", "factor", "state", "adjoint", "gradient", "verification"];
+    let parts =
+        ["setup", "remesh", "assembly", "factor", "state", "adjoint", "gradient", "estimate", "verification"];
     let shown: Vec<String> = parts
         .into_iter()
         .filter(|part| of(part) >= 0.1 * total && of(part) > 0.0)

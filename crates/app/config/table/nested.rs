@@ -95,6 +95,11 @@ impl<T: Group> Value<Tables> for Vec<T> {
     }
 }
 
+/// The head of a table with a name of the user's.
+fn of_a_name(path: &str) -> String {
+    format!("[{path}.NAME]")
+}
+
 /// Values by names of the user's: tables `[key.NAME]`, or `key = { NAME = value }`.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::config) struct ByName<K>(pub(in crate::config) K);
@@ -118,7 +123,14 @@ impl<K: Kind, T: Value<K>> Value<ByName<K>> for BTreeMap<String, T> {
                         None,
                     );
                 }
-                None => _ = entry.section(),
+                None => {
+                    let message =
+                        format!("`{}` is {}, not a table", entry.path, entry.node.content.describe());
+                    let help = matches!(entry.node.content, Content::Array(_)).then(|| {
+                        format!("write {} with single brackets, once for each", of_a_name(&entry.path))
+                    });
+                    entry.wrong(message, &format!("a table for each name: {}", of_a_name(&entry.path)), help);
+                }
             }
             return None;
         };
@@ -126,7 +138,12 @@ impl<K: Kind, T: Value<K>> Value<ByName<K>> for BTreeMap<String, T> {
             let item = Entry { node, path: join(&entry.path, name), context: entry.context };
             if name.trim().is_empty() || name.chars().any(char::is_control) {
                 let message = format!("`{}` cannot be the name of a table in `{}`", shown(name), entry.path);
-                item.wrong(message, "a name without control characters", None);
+                item.wrong(message, "a name that is not empty, without control characters", None);
+                return None;
+            }
+            if kind.dimension().is_none() && !matches!(item.node.content, Content::Table(_)) {
+                let message = format!("`{}` is {}, not a table", item.path, item.node.content.describe());
+                item.wrong(message, &format!("a table for each name: {}", of_a_name(&entry.path)), None);
                 return None;
             }
             Some((name.clone(), T::read(kind, &item)?))

@@ -33,10 +33,10 @@ table! {
     pub struct Accuracy: Default {
         /// Whether the errors that come from the mesh are estimated, of the objective and of losses, forces, flux linkages,
         /// expansions and probes: by `solve`, and by `run` at the first and the best design, unless `output.verify_refinement` is 0. In
-        /// one process. Default: an estimate is made for elements of first order, and given up where it would cost more than three
-        /// evaluations and more than two seconds (along a B–H curve: than each step of Newton's method may). `true`: it is made
-        /// whatever it costs, and for elements of second order too, on eight times as many. With B–H curves there is one at 0 Hz
-        /// alone.
+        /// one process. Default: an estimate is made for elements of first order, and given up where its iterations would cost more
+        /// than three evaluations and more than two seconds for each state (along a B–H curve: than each step of Newton's method
+        /// may); to set up its system of second order takes its time beside that. `true`: it is made whatever it costs, and for
+        /// elements of second order too, on eight times as many. With B–H curves there is one at 0 Hz alone.
         estimate: Option<bool> = FLAG;
         /// `run`: largest error bar of the objective that the mesh may make: at the initial design relative to the objective there,
         /// at the best one relative to the larger of both. With first order, in one process. Default: the mesh stays what it is,

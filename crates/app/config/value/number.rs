@@ -123,6 +123,14 @@ impl Value<Whole> for usize {
                     None,
                 ),
             },
+            Content::Float(value) if value.fract() == 0.0 => {
+                let message = format!(
+                    "`{}` is the number {value}, with a point or an exponent or too long",
+                    entry.path
+                );
+                let is_possible = (least as f64..=most as f64).contains(&value);
+                entry.wrong(message, &expected, is_possible.then(|| format!("write {value}")));
+            }
             ref other => {
                 let message = format!("`{}` is {}, not a whole number", entry.path, other.describe());
                 entry.wrong(message, &expected, other.as_number());

@@ -31,7 +31,7 @@ impl Value<Text> for String {
         let path = &entry.path;
         match &entry.node.content {
             Content::Text(text) if text.trim().is_empty() => {
-                entry.wrong(format!("`{path}` is empty"), "a text in quotes", None);
+                entry.wrong(format!("`{path}` is empty"), "a text that is not empty", None);
             }
             Content::Text(text) if text.chars().any(char::is_control) => {
                 let message = format!("`{path}` is \"{}\", with a control character", shown(text));
