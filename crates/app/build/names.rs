@@ -99,7 +99,10 @@ fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagno
                     "a region with elements; a mesh that a run has written has none where an impedance surface or a perfect \
                      conductor stood: take the mesh that the run began with",
                 ),
-                _ => fault.expected("a region with elements; where regions overlap, the later one has them"),
+                config::MeshConfig::Boxes(_) => {
+                    fault.expected("a region with elements; where regions overlap, the later one has them")
+                }
+                _ => fault.expected("a region with elements"),
             });
         }
         Ok(_) => {}

@@ -371,7 +371,7 @@ fn overlap_faults(
     for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(moves)) {
         // Places of an expansion follow no cells.
         let (follow, instead) = if path.starts_with("multipoles[") {
-            ("follow = \"space\", for places that stay", "or take a smaller radius, or take")
+            ("follow = \"space\", for places that stay", "take a smaller radius, or take")
         } else {
             (
                 "follow = \"space\" for places that stay, follow = \"mesh\" for cells that move along",

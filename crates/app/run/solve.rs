@@ -198,7 +198,7 @@ impl Session<'_> {
     }
 }
 
-/// What work gives; its time is added [s].
+/// Does the work, and adds its wall time to `seconds` [s].
 fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
     let clock = Instant::now();
     let found = work();

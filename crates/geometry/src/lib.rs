@@ -13,6 +13,7 @@ pub mod depth;
 mod determinism;
 pub mod directions;
 pub mod disjoint_sets;
+mod eigen;
 pub mod error;
 mod facets;
 pub mod fem;
@@ -30,6 +31,7 @@ pub mod soundness;
 pub mod tet4;
 pub mod topology;
 
+pub use eigen::eigen_decomposition;
 pub use error::MeshError;
 pub use ids::{CarrierId, ElementId, NodeId, RegionId};
 pub use mesh::Mesh;

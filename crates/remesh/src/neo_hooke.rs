@@ -18,12 +18,13 @@
 //! with their absolute values (Chen et al., Stabler neo-Hookean simulation: absolute eigenvalue filtering for projected Newton,
 //! SIGGRAPH 2024) takes half of the steps of that with zeros (docs/torture.md).
 
+use fluxmorph_geometry::eigen_decomposition;
 use fluxmorph_geometry::fem::LocalMatrix;
 use fluxmorph_geometry::tet4::{Point, cross, dot};
 
 use crate::barrier::{Density, logarithm};
 use crate::elasticity::Tensor;
-use crate::singular_values::{SingularValues, eigen_decomposition};
+use crate::singular_values::SingularValues;
 
 /// `δ`: volume ratio below which the barrier is its Taylor polynomial. That of the least room, [`crate::LEAST_ROOM`]: any smaller
 /// one takes more Newton steps where a motion starts with inverted elements (a cylinder shifted and turned: 12 at 0.03, 16 at

@@ -10,12 +10,12 @@
 //! direction is `w_i = (h̄ / h)² (h̄ / h_i)^{1/2}`: the first factor is one on Young's modulus, the second a law with
 //! directions, [`crate::elasticity`], with the tensor `T = Σ (h̄ / h_i)^{1/4} n_i n_iᵀ`.
 
+use fluxmorph_geometry::eigen_decomposition;
 use fluxmorph_geometry::fem::scalar::ordered_sum;
 use fluxmorph_geometry::tet4::{self, FACES, Point, centroid, sub};
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::elasticity::{ISOTROPIC, Tensor};
-use crate::singular_values::eigen_decomposition;
 
 /// Exponents of the directional weights: of the size along the direction, and of the element's mean size.
 ///

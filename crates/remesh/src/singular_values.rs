@@ -1,5 +1,6 @@
-//! Eigenvalues of symmetric matrices and singular values of matrices, 3 × 3.
+//! Singular values of matrices, 3 × 3.
 
+use fluxmorph_geometry::eigen_decomposition;
 use fluxmorph_geometry::tet4::{Point, cross, dot, norm};
 
 use crate::elasticity::{ISOTROPIC, Tensor};
@@ -42,39 +43,6 @@ impl SingularValues {
 fn unit(x: Point) -> Option<Point> {
     let length = norm(x);
     (length > f64::MIN_POSITIVE.sqrt()).then(|| x.map(|c| c / length))
-}
-
-/// Eigenvalues and unit eigenvectors of a symmetric matrix, in no order, by cyclic Jacobi rotations (Golub & Van Loan,
-/// Matrix Computations, 4th ed., section 8.5): small eigenvalues come out to their own precision where the matrix is
-/// graded, and nothing is allocated.
-pub(crate) fn eigen_decomposition(mut a: Tensor) -> ([f64; 3], [Point; 3]) {
-    let mut axes = ISOTROPIC;
-    // Converges quadratically: 3 × 3 matrices take four or five sweeps.
-    for _ in 0..10 {
-        let rest = a[0][1].abs() + a[0][2].abs() + a[1][2].abs();
-        if rest <= f64::MIN_POSITIVE {
-            break;
-        }
-        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
-                continue;
-            }
-            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
-            let t = 1.0f64.copysign(theta) / (theta.abs() + theta.hypot(1.0));
-            let cosine = 1.0 / t.hypot(1.0);
-            let sine = t * cosine;
-            let turn = |x: f64, y: f64| (cosine * x - sine * y, sine * x + cosine * y);
-            for k in 0..3 {
-                (a[k][p], a[k][q]) = turn(a[k][p], a[k][q]);
-            }
-            for k in 0..3 {
-                (a[p][k], a[q][k]) = turn(a[p][k], a[q][k]);
-                (axes[p][k], axes[q][k]) = turn(axes[p][k], axes[q][k]);
-            }
-            (a[p][q], a[q][p]) = (0.0, 0.0);
-        }
-    }
-    ([a[0][0], a[1][1], a[2][2]], axes)
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use fluxmorph_geometry::fem::{
     BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, Hosts, LocalMatrix, c64,
 };
 use fluxmorph_geometry::parallel::{Aggregates, Ownership, RowLayout};
+use fluxmorph_geometry::tet4::area_vector;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
 use crate::boundary::Boundary;
@@ -182,7 +183,8 @@ impl Discretisation {
     }
 
     /// The prolongation from a coarse space: linear elements for quadratic ones, joined to aggregates where there are many and the
-    /// tolerance is rough; for linear ones ψ in full and aggregates of `A`, by the couplings of `matrix`, and around iron hat functions.
+    /// tolerance is rough; for linear ones ψ in full and aggregates of `A`, by the couplings of `matrix`, with hats
+    /// beside them around iron.
     ///
     /// # Errors
     /// As [`Unknowns::new`]; [`SolverError::Parameter`] for first-order edge elements, which have none.
@@ -218,11 +220,15 @@ impl Discretisation {
         let dofs = &self.unknowns.dofs;
         let all: Vec<u32> = (0..dofs.count() as u32).collect();
         let aggregates = |passes| aggregation::aggregates(dofs, &all, matrix, passes);
-        Ok(if weak_form.contrast() >= hats::CONTRAST {
-            hats::prolongation(dofs, mesh.points(), &aggregates(aggregation::PASSES_BESIDE_HATS))
-        } else {
-            aggregation::prolongation(aggregates(aggregation::PASSES))
-        })
+        if weak_form.reluctivity_contrast() < hats::RELUCTIVITY_CONTRAST {
+            return Ok(aggregation::prolongation(aggregates(aggregation::PASSES)));
+        }
+        let nodes = hats::Nodes {
+            points: mesh.points(),
+            axes: hats::axes(weak_form.interfaces().map(|t| area_vector(t.map(|n| mesh.point(n))))),
+            frame: |node| self.unknowns.frame(node),
+        };
+        Ok(hats::prolongation(dofs, &nodes, &aggregates(aggregation::PASSES_BESIDE_HATS)))
     }
 
     /// The coarse space of the rows of this rank, by the couplings of their matrix; linear nodal elements alone have one.

@@ -101,8 +101,9 @@ impl WeakForm {
         &self.coefficients[self.topology.region_of()[e.index()].index()]
     }
 
-    /// The largest reluctivity of an element over the smallest.
-    pub(crate) fn contrast(&self) -> f64 {
+    /// The largest reluctivity of an element over the smallest; of a B–H law that of its linear part. What an impedance surface stands
+    /// for has no elements.
+    pub(crate) fn reluctivity_contrast(&self) -> f64 {
         let reluctivities = self.topology.elements().map(|e| self.coefficients_of(e).reluctivity);
         let wider = |(least, most): (f64, f64), nu: f64| (least.min(nu), most.max(nu));
         let (least, most) = reluctivities.fold((f64::INFINITY, 0.0), wider);
@@ -166,6 +167,13 @@ impl WeakForm {
             }
         }
         conductors
+    }
+
+    /// The triangles at which the reluctivity jumps.
+    pub(crate) fn interfaces(&self) -> impl Iterator<Item = [NodeId; 3]> + '_ {
+        self.surface()
+            .filter(|(_, term)| matches!(term, SurfaceTerm::Interface(_)))
+            .map(|(triangle, _)| triangle)
     }
 
     /// Every triangle with its term.

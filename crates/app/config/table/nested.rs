@@ -95,8 +95,8 @@ impl<T: Group> Value<Tables> for Vec<T> {
     }
 }
 
-/// The head of a table with a name of the user's.
-fn of_a_name(path: &str) -> String {
+/// The head of a table with a name of the user's, as it stands in a file.
+fn named_table_head(path: &str) -> String {
     format!("[{path}.NAME]")
 }
 
@@ -127,9 +127,13 @@ impl<K: Kind, T: Value<K>> Value<ByName<K>> for BTreeMap<String, T> {
                     let message =
                         format!("`{}` is {}, not a table", entry.path, entry.node.content.describe());
                     let help = matches!(entry.node.content, Content::Array(_)).then(|| {
-                        format!("write {} with single brackets, once for each", of_a_name(&entry.path))
+                        format!("write {} with single brackets, once for each", named_table_head(&entry.path))
                     });
-                    entry.wrong(message, &format!("a table for each name: {}", of_a_name(&entry.path)), help);
+                    entry.wrong(
+                        message,
+                        &format!("a table for each name: {}", named_table_head(&entry.path)),
+                        help,
+                    );
                 }
             }
             return None;
@@ -143,7 +147,11 @@ impl<K: Kind, T: Value<K>> Value<ByName<K>> for BTreeMap<String, T> {
             }
             if kind.dimension().is_none() && !matches!(item.node.content, Content::Table(_)) {
                 let message = format!("`{}` is {}, not a table", item.path, item.node.content.describe());
-                item.wrong(message, &format!("a table for each name: {}", of_a_name(&entry.path)), None);
+                item.wrong(
+                    message,
+                    &format!("a table for each name: {}", named_table_head(&entry.path)),
+                    None,
+                );
                 return None;
             }
             Some((name.clone(), T::read(kind, &item)?))

@@ -124,12 +124,9 @@ impl Value<Whole> for usize {
                 ),
             },
             Content::Float(value) if value.fract() == 0.0 => {
-                let message = format!(
-                    "`{}` is the number {value}, with a point or an exponent or too long",
-                    entry.path
-                );
+                let message = format!("`{}` is {}, written as a real number", entry.path, written(value));
                 let is_possible = (least as f64..=most as f64).contains(&value);
-                entry.wrong(message, &expected, is_possible.then(|| format!("write {value}")));
+                entry.wrong(message, &expected, is_possible.then(|| format!("write {}", value as usize)));
             }
             ref other => {
                 let message = format!("`{}` is {}, not a whole number", entry.path, other.describe());

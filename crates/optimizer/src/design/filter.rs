@@ -14,7 +14,8 @@
 //! * nodes that are mirror images get mirrored rows, and the transpose is that of a sparse matrix.
 //!
 //! Its price is memory, `π (r / h)²` entries a node, which is why there is a limit. Distances are straight, so a node only
-//! sees nodes of the same connected piece that move to the same side: the two faces of a thin plate do not mix. Where a
+//! sees nodes of the same connected piece whose directions are less than 87° from its own: the two faces of a thin plate do not mix,
+//! nor do faces at right angles. Where a
 //! symmetry plane cuts the surface, the mirror images of the nodes count too: half a model gives the surface of the whole.
 
 use std::collections::BTreeMap;
@@ -34,8 +35,8 @@ const LARGEST: usize = 50_000_000;
 /// designs of two cells are still seen. With it rails carry 20 of 20 random designs (docs/torture.md).
 const CELLS: f64 = 1.5;
 
-/// Cosine of the angle up to which directions are of one side, 87 degrees: faces that meet at right angles are not, with the digits of
-/// any file and however the device is turned.
+/// Cosine of the angle up to which directions are of one side, 87 degrees: the margin keeps faces at right angles apart, whatever the
+/// rounding of a file or of a turned device.
 const ONE_SIDE: f64 = 0.05;
 
 /// Size of a cell of a surface [m]: the mean over its area of the side of a square that two triangles would fill.

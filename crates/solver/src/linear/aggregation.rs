@@ -5,7 +5,7 @@
 //! The unknowns of `ψ` therefore stay in the coarse space one by one; `A` is aggregated in conductors as elsewhere. In the air
 //! the system is close to one Laplacian a component, for which piecewise constants on aggregates of about 2^passes strongly
 //! coupled unknowns do (pairwise aggregation: Notay, Electron. Trans. Numer. Anal. 37 (2010) 123). The Galerkin product couples
-//! the components.
+//! the components. Around iron that is not enough, and hats stand beside larger aggregates ([`hats`](super::hats)).
 //!
 //! For quadratic elements the linear functions of `A` can be joined in the same way. To a residual of 10⁻¹¹ that takes half as many
 //! iterations again with pairs, and is not done; to the 10⁻³ of an error estimate it pays where the coarse factor is most of the
@@ -25,7 +25,7 @@ use crate::unknowns::PSI;
 /// 2.7 times as long for the coarse factor; one more takes half as many iterations again.
 pub(crate) const PASSES: usize = 3;
 
-/// The same beside hat functions: 32 unknowns an aggregate.
+/// The same beside hats: 32 unknowns an aggregate.
 pub(crate) const PASSES_BESIDE_HATS: usize = 5;
 
 /// Passes of pairing of the linear functions of quadratic elements: four an aggregate.

@@ -1,104 +1,152 @@
-//! Hat functions on a grid, beside the aggregates of linear nodal elements: what the coarse space has for long waves.
+//! Nodal functions of a coarse grid ("hats") beside the aggregates of linear nodal elements: what the coarse space has for long waves
+//! around iron.
 //!
-//! Around iron, fields `A = ∇χ` whose χ is harmonic outside of it have no energy but what the iron has of them, `1/μr` of that of
-//! other fields as smooth; of linear elements they have `(k h)²` of it, for waves of number `k` in cells `h`, where that is more.
-//! Piecewise constants have all of it for any of these fields. With aggregates alone the condition therefore grows as `1/h²` up to
-//! `μr`, longest waves first. Continuous functions a few cells wide have `(k H)²` of it, and the condition stays at `(H/h)²`.
+//! Outside of iron a field `A = ∇χ` with harmonic χ has neither curl nor divergence; its energy is what the iron has of it. Of a wave
+//! number `k` [1/m] that is about `1/μr` of `k² ‖A‖²`, the energy of any other field as smooth. Linear elements on cells of size `h`
+//! raise it to `max(1/μr, (k h)²)` of that. What functions of a coarse space that are nearest to it have in energy beside is all of
+//! `k² ‖A‖²` for piecewise constants, and `(k H)²` of it for continuous functions of width `H`. So the condition is up to `1/(k h)²` with
+//! aggregates alone, worst for the longest waves, and `(H/h)²` with hats.
 //!
-//! The grid is one along the axes. Its lines are quantiles of the coordinates of the nodes, so that it is fine where the mesh is;
-//! its cells are cut into six tetrahedra, on which hats are linear: four a node (Kuhn's triangulation).
+//! The axes of the grid are those of the coordinates or, where the surface of the iron lies askew to them, of its normals: hats that
+//! reach across a plate do little. Its lines are quantiles of the nodes' coordinates, so that it is fine where the mesh is, with about
+//! as many lines across each axis: for a mesh that is much longer than wide along one axis, too few. Cells are cut into six tetrahedra,
+//! on which hats are linear (H. Freudenthal, Ann. of Math. 43 (1942) 580): four a node.
 
-use std::iter;
-
-use fluxmorph_geometry::CarrierId;
 use fluxmorph_geometry::fem::{CsrMatrix, DofMap};
 use fluxmorph_geometry::parallel::Aggregates;
-use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::tet4::{Point, dot, norm};
+use fluxmorph_geometry::{CarrierId, eigen_decomposition};
 
+use crate::fixed_directions::Frame;
 use crate::unknowns::PSI;
 
 /// The largest reluctivity over the smallest from which hats pay. On a plate of 51 000 and 210 000 unknowns factor, state and adjoint
-/// take 1.19 and 1.13 of what they take with aggregates alone at 3, .98 and 1.02 at 10, .76 and .67 at 100.
-pub(crate) const CONTRAST: f64 = 10.0;
+/// take 1.19 and 1.13 of the time with aggregates alone at 3, 0.98 and 1.02 at 10, 0.76 and 0.67 at 100.
+pub(crate) const RELUCTIVITY_CONTRAST: f64 = 10.0;
 
-/// Vertices of the grid, of the square root of the nodes of the mesh: between as many for each node, of which the coarse factor would
-/// be most of the work on fine meshes, and as many on all meshes, with which iterations would grow as without hats.
-const VERTICES: f64 = 8.0;
+/// Vertices of the grid over the square root of the nodes of the mesh, at most. With as many for each node the coarse factor would be
+/// most of the work on fine meshes; with as many on every mesh iterations would grow as without hats.
+const VERTICES_PER_ROOT_NODE: f64 = 8.0;
 
-/// Nodes for each vertex, at least.
-const NODES: f64 = 15.0;
+/// Nodes for each vertex of the grid, at least: on small meshes, too, the coarse level is to be a small one.
+const NODES_PER_VERTEX: f64 = 15.0;
 
-/// Unknowns that a hat has at least.
-const LEAST_UNKNOWNS: usize = 4;
+/// Share of all normals that is along other directions, up to which a surface lies along the axes.
+const ALONG: f64 = 1e-3;
 
-/// Lines closer than this share of the length of the mesh are one.
+/// Share of all normals by which more are along one direction than along another, from which on a surface has directions.
+const DIRECTED: f64 = 0.1;
+
+/// Unknowns that a hat has at least: one of fewer is no smoother than an aggregate.
+const LEAST_UNKNOWNS: u32 = 4;
+
+/// Lines closer than this share of the length of the mesh are one: the rounding of coordinates.
 const SAME: f64 = 1e-9;
 
-/// The prolongation from aggregates and hats; shape `(dofs.count(), n_coarse)`, aggregates first.
+/// No column.
+const NONE: u32 = u32::MAX;
+
+/// The nodes of the mesh, the axes of the grid and those of the components of `A` at nodes that have others than the coordinates'.
+pub(crate) struct Nodes<'a, F: Fn(CarrierId) -> Option<&'a Frame>> {
+    pub(crate) points: &'a [Point],
+    pub(crate) axes: [Point; 3],
+    pub(crate) frame: F,
+}
+
+/// The prolongation from aggregates and, for every component of `A`, hats; shape `(dofs.count(), n_coarse)`, aggregates first.
 ///
-/// All hats together are one everywhere, as all aggregates are: the columns depend on each other.
-pub(crate) fn prolongation(dofs: &DofMap<4>, points: &[Point], aggregates: &Aggregates) -> CsrMatrix<f64> {
-    let grid = Grid::new(points, vertices(points));
-    let mut hats = vec![Vec::new(); dofs.count()];
-    let mut unknowns = vec![0; PSI * grid.vertex_count()];
+/// The hats of a component sum to one, as its aggregates do, unless one has too few unknowns and is left out: the columns depend on
+/// each other.
+pub(crate) fn prolongation<'a>(
+    dofs: &DofMap<4>,
+    nodes: &Nodes<'a, impl Fn(CarrierId) -> Option<&'a Frame>>,
+    aggregates: &Aggregates,
+) -> CsrMatrix<f64> {
+    let grid = Grid::new(nodes);
+    let corners: Vec<[(usize, f64); 4]> = nodes.points.iter().map(|&point| grid.corners(point)).collect();
+    let mut place = vec![(CarrierId::new(0), PSI); dofs.count()];
     for node in (0..dofs.carrier_count()).map(CarrierId::new) {
-        let corners = grid.corners(points[node.index()]);
         for c in 0..PSI {
             if let Some(equation) = dofs.equation(node, c) {
-                let own = corners.iter().filter(|corner| corner.1 > 0.0);
-                hats[equation] =
-                    own.map(|&(vertex, weight)| (c * grid.vertex_count() + vertex, weight)).collect();
-                hats[equation].iter().for_each(|hat: &(usize, f64)| unknowns[hat.0] += 1);
+                place[equation] = (node, c);
             }
         }
     }
-    let mut count = aggregates.count;
-    let number = |unknowns: usize| {
-        let is_column = unknowns >= LEAST_UNKNOWNS;
-        count += usize::from(is_column);
-        is_column.then(|| count - 1)
+    // Hat and weight; in a frame of its own a component has a share of those of all coordinates.
+    let hats = |&(node, c): &(CarrierId, usize)| {
+        let axis = (nodes.frame)(node).map_or(Frame::COORDINATES.axes, |frame| frame.axes).get(c).copied();
+        let own = axis.into_iter().flat_map(move |axis| (0..3).map(move |d| (d, axis[d])));
+        let corners = &corners[node.index()];
+        own.flat_map(move |(d, share)| corners.iter().map(move |corner| (3 * corner.0 + d, share * corner.1)))
+            .filter(|hat| hat.1 != 0.0)
     };
-    let columns: Vec<Option<usize>> = unknowns.into_iter().map(number).collect();
-    let rows = hats.iter().zip(&aggregates.of_row).map(|(own, &aggregate)| {
-        let own = own.iter().filter_map(|&(hat, weight)| Some((columns[hat]?, weight)));
-        iter::once((aggregate as usize, 1.0)).chain(own).collect()
-    });
-    let rows: Vec<Vec<(usize, f64)>> = rows.collect();
-    CsrMatrix::from_rows(count, rows)
+    let mut unknowns = vec![0; 3 * grid.vertex_count()];
+    place.iter().flat_map(hats).for_each(|hat| unknowns[hat.0] += 1);
+    let mut count = aggregates.count as u32;
+    let number = |unknowns: u32| {
+        let column = if unknowns >= LEAST_UNKNOWNS { count } else { NONE };
+        count += u32::from(column != NONE);
+        column
+    };
+    let columns: Vec<u32> = unknowns.into_iter().map(number).collect();
+    let row = |(place, &aggregate): (&(CarrierId, usize), &u32)| {
+        let mut row = vec![(aggregate as usize, 1.0)];
+        row.extend(hats(place).map(|(hat, weight)| (columns[hat] as usize, weight)));
+        row.retain(|entry| entry.0 != NONE as usize);
+        row
+    };
+    CsrMatrix::from_rows(count as usize, place.iter().zip(&aggregates.of_row).map(row))
 }
 
-/// How many vertices a grid has, about.
-fn vertices(points: &[Point]) -> f64 {
-    let nodes = points.len() as f64;
-    (VERTICES * nodes.sqrt()).min(nodes / NODES)
+/// The axes along which the normals of a surface lie, of the area vectors [m²] of its triangles: the eigenvectors of the sum of `n nᵀ`.
+/// Of a surface along the axes of the coordinates, and of one that has as much in all directions, these.
+pub(crate) fn axes(areas: impl Iterator<Item = Point>) -> [Point; 3] {
+    let mut normals = [[0.0; 3]; 3];
+    for area in areas {
+        let length = norm(area).max(f64::MIN_POSITIVE);
+        for i in 0..3 {
+            for j in 0..3 {
+                normals[i][j] += area[i] / length * area[j];
+            }
+        }
+    }
+    let [x, y, z]: [Point; 3] = normals;
+    let all = x[0] + y[1] + z[2];
+    let (values, axes) = eigen_decomposition(normals);
+    let [least, most] = [values.into_iter().fold(all, f64::min), values.into_iter().fold(0.0, f64::max)];
+    let is_along = x[1].abs() + x[2].abs() + y[2].abs() <= ALONG * all;
+    if is_along || most - least <= DIRECTED * all { Frame::COORDINATES.axes } else { axes }
 }
 
-/// Lines along the axes.
+/// Lines across the axes, where a coordinate along one of them is so much [m].
 struct Grid {
+    axes: [Point; 3],
     lines: [Vec<f64>; 3],
 }
 
 impl Grid {
-    /// A grid of about so many vertices.
-    fn new(points: &[Point], mut vertices: f64) -> Self {
-        let sorted = [0, 1, 2].map(|axis| {
-            let mut values: Vec<f64> = points.iter().map(|point| point[axis]).collect();
+    fn new<'a, F: Fn(CarrierId) -> Option<&'a Frame>>(nodes: &Nodes<'a, F>) -> Self {
+        let Nodes { points, axes, .. } = *nodes;
+        let sorted = axes.map(|axis| {
+            let mut values: Vec<f64> = points.iter().map(|&point| dot(axis, point)).collect();
             values.sort_unstable_by(f64::total_cmp);
             values
         });
         let distinct = sorted.each_ref().map(|values| merged(values).len());
-        let mut axes = [0, 1, 2];
-        axes.sort_by_key(|&axis| distinct[axis]);
+        let mut order = [0, 1, 2];
+        order.sort_by_key(|&axis| distinct[axis]);
         let mut lines = [const { Vec::new() }; 3];
+        let count = points.len() as f64;
+        let mut vertices = (VERTICES_PER_ROOT_NODE * count.sqrt()).min(count / NODES_PER_VERTEX);
         // An axis with few distinct coordinates leaves its share to the others.
-        for (axis, left) in axes.into_iter().zip([3.0, 2.0, 1.0]) {
+        for (axis, left) in order.into_iter().zip([3.0, 2.0, 1.0]) {
             let values = &sorted[axis];
             let count = (vertices.powf(1.0 / left).round() as usize).clamp(2, distinct[axis].max(2));
             let quantile = |k: usize| values[k * (values.len() - 1) / (count - 1)];
             lines[axis] = merged(&(0..count).map(quantile).collect::<Vec<_>>());
             vertices /= lines[axis].len() as f64;
         }
-        Self { lines }
+        Self { axes, lines }
     }
 
     fn vertex_count(&self) -> usize {
@@ -110,8 +158,10 @@ impl Grid {
         let (mut vertex, mut stride) = (0, 1);
         let mut steps = [(0.0, 0); 3];
         for (axis, lines) in self.lines.iter().enumerate() {
-            let cell = lines.partition_point(|&line| line <= point[axis]).clamp(1, lines.len() - 1) - 1;
-            let share = (point[axis] - lines[cell]) / (lines[cell + 1] - lines[cell]);
+            let along = dot(self.axes[axis], point);
+            // A mesh with a volume has two lines; where the last ones are merged, a node may lie a rounding beyond.
+            let cell = lines.partition_point(|&line| line <= along).min(lines.len() - 1).max(1) - 1;
+            let share = ((along - lines[cell]) / (lines[cell + 1] - lines[cell])).clamp(0.0, 1.0);
             steps[axis] = (share, stride);
             vertex += cell * stride;
             stride *= lines.len();
@@ -140,6 +190,12 @@ fn merged(values: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
+    const COORDINATES: [Point; 3] = Frame::COORDINATES.axes;
+
+    fn straight(points: &[Point]) -> Nodes<'_, impl Fn(CarrierId) -> Option<&'static Frame>> {
+        Nodes { points, axes: COORDINATES, frame: |_| None }
+    }
+
     /// Nodes of a lattice that is finer on one side, each with all components but for some of ψ.
     fn lattice() -> (DofMap<4>, Vec<Point>) {
         let along = |i: usize| (0.25 * i as f64).exp();
@@ -151,7 +207,7 @@ mod tests {
     #[test]
     fn hats_reproduce_linear_functions_and_aggregates_stay() {
         let (dofs, points) = lattice();
-        let grid = Grid::new(&points, vertices(&points));
+        let grid = Grid::new(&straight(&points));
         let plane = |p: Point| 3.0 - 2.0 * p[0] + 0.5 * p[1] + 7.0 * p[2];
         let lines = &grid.lines;
         let at = |vertex: usize| {
@@ -166,7 +222,7 @@ mod tests {
         }
         let of_row: Vec<u32> = (0..dofs.count() as u32).map(|row| row / 5).collect();
         let aggregates = Aggregates { count: of_row[of_row.len() - 1] as usize + 1, of_row };
-        let p = prolongation(&dofs, &points, &aggregates);
+        let p = prolongation(&dofs, &straight(&points), &aggregates);
         for (row, &aggregate) in aggregates.of_row.iter().enumerate() {
             let own = p.structure.row(row);
             assert_eq!((p.structure.columns[own.start], p.values[own.start]), (aggregate, 1.0));
@@ -178,11 +234,49 @@ mod tests {
         assert_eq!(p.structure.row(psi).len(), 1);
     }
 
+    /// A field that is linear in space, in the components of nodes with directions of their own.
+    #[test]
+    fn hats_are_turned_where_components_are() {
+        let (dofs, points) = lattice();
+        let (sin, cos) = 0.3_f64.sin_cos();
+        let turned = Frame { axes: [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]] };
+        let axes_of = |node: usize| if node % 3 == 0 { turned.axes } else { COORDINATES };
+        let frame = |node: CarrierId| (node.index() % 3 == 0).then_some(&turned);
+        let aggregates = Aggregates { count: 1, of_row: vec![0; dofs.count()] };
+        let p = prolongation(&dofs, &Nodes { points: &points, axes: COORDINATES, frame }, &aggregates);
+        // The coarse function with all hats of x is the field (1, 0, 0); none is left out in the middle of the lattice.
+        let node = 5 + 12 * 5 + 120 * 3;
+        let sum_at = |node: usize, c: usize| {
+            let row = p.structure.row(dofs.equation(CarrierId::new(node), c).expect("it has one"));
+            p.values[row.start + 1..row.end].iter().sum::<f64>()
+        };
+        for node in [node, node + 1, node + 2] {
+            for c in 0..3 {
+                let expected: f64 = axes_of(node)[c].iter().sum();
+                assert!((sum_at(node, c) - expected).abs() < 1e-12, "component {c} of node {node}");
+            }
+        }
+    }
+
     #[test]
     fn an_axis_with_few_coordinates_leaves_its_lines_to_the_others() {
         let points: Vec<Point> =
             (0..20 * 20 * 2).map(|n| [(n % 20) as f64, (n / 20 % 20) as f64, (n / 400) as f64]).collect();
-        let grid = Grid::new(&points, 98.0);
-        assert_eq!(grid.lines.each_ref().map(Vec::len), [7, 7, 2]);
+        // 800/15 vertices: two planes of five by five.
+        let grid = Grid::new(&straight(&points));
+        assert_eq!(grid.lines.each_ref().map(Vec::len), [5, 5, 2]);
+    }
+
+    #[test]
+    fn the_axes_are_those_of_a_surface_that_is_askew() {
+        let (sin, cos) = 0.4_f64.sin_cos();
+        let turned = |x: Point| [cos * x[0] - sin * x[2], x[1], sin * x[0] + cos * x[2]];
+        let block = [[3.0, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 1.0]];
+        let found = axes(block.into_iter().map(turned));
+        for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(turned) {
+            assert!(found.iter().any(|own| (dot(*own, axis).abs() - 1.0).abs() < 1e-12), "{found:?}");
+        }
+        assert_eq!(axes(block.into_iter()), COORDINATES);
+        assert_eq!(axes([].into_iter()), COORDINATES);
     }
 }

@@ -41,7 +41,7 @@ impl Transfer {
         (0..p.row_count()).map(alone).collect()
     }
 
-    /// Which coarse unknowns have shares of unknowns.
+    /// Which coarse unknowns have a weight other than one.
     pub(crate) fn has_shares(&self) -> Vec<bool> {
         let CsrMatrix { structure, values } = &self.restriction;
         (0..structure.row_count()).map(|row| values[structure.row(row)].iter().any(|&w| w != 1.0)).collect()
@@ -129,22 +129,22 @@ impl Transfer {
         structure: &Arc<CsrStructure>,
         fine: &CsrMatrix<c64>,
     ) -> CsrMatrix<c64> {
-        product(structure, &self.restriction, fine, itself)
+        product(structure, &self.restriction, fine, identity_row)
     }
 
     /// `Pᵀ K P` from `Pᵀ K`, with the structure of [`Self::structure_of_restricted`]: where rows of `P` have several entries that
-    /// is less work than [`Self::coarse_matrix`], and holds `Pᵀ K`.
+    /// is less work than [`Self::coarse_matrix`], at the price of `Pᵀ K` in memory.
     pub(crate) fn matrix_of_restricted(
         &self,
         structure: &Arc<CsrStructure>,
         restricted: &CsrMatrix<c64>,
     ) -> CsrMatrix<c64> {
-        product(structure, restricted, &self.prolongation, itself)
+        product(structure, restricted, &self.prolongation, identity_row)
     }
 }
 
-/// The row of the identity.
-fn itself(column: &u32) -> (&[f64], &[u32]) {
+/// A row of the identity.
+fn identity_row(column: &u32) -> (&[f64], &[u32]) {
     (&[1.0], slice::from_ref(column))
 }
 
@@ -286,7 +286,9 @@ mod tests {
             3,
             [vec![(0, 1.0)], vec![(1, 1.0)], vec![(1, 1.0)], vec![(0, 0.5), (2, 0.5)]],
         );
-        assert_eq!(Transfer::new(p).is_coarse(), [false, false, false, false]);
+        let transfer = Transfer::new(p);
+        assert_eq!(transfer.is_coarse(), [false, false, false, false]);
+        assert_eq!(transfer.has_shares(), [true, false, true]);
         let p = CsrMatrix::from_rows(2, [vec![(0, 1.0)], vec![(1, 1.0)], vec![(1, 1.0)]]);
         assert_eq!(Transfer::new(p).is_coarse(), [true, false, false]);
     }

@@ -12,7 +12,7 @@
 //! balanced `Q r + (I − Q K) S (I − K Q) r`, which is complex symmetric, at little more than half the cost; the iteration
 //! keeps residuals free of it if it begins with [`TwoLevel::start`]. Unlike smoothing before and after, it does not ask that
 //! `S` contracts, which an incomplete factor does not on flat elements. All that it takes of `K S r` is `Pᵀ K S r`: beside an
-//! incomplete factor `Pᵀ K`, which has fewer entries than `K`, is kept in single precision.
+//! incomplete factor `Pᵀ K`, which has about as many entries as `K`, is kept in single precision.
 
 use std::sync::Arc;
 
@@ -34,9 +34,9 @@ const ROWS: usize = 1024;
 /// What the diagonal is multiplied by before the incomplete factorisation. Between 1.0 and 1.05 the iterations hardly change.
 const DIAGONAL_FACTOR: f64 = 1.02;
 
-/// What diagonal entries of hats are multiplied by: all hats are as much as all aggregates together, and the coarse matrix would be
-/// singular. From nothing to 1e-4 more the iterations do not change.
-const RAISED: f64 = 1.0 + 1e-5;
+/// What diagonal entries of hats are multiplied by: the hats of a component sum to one, as its aggregates do, and the coarse matrix
+/// would be singular but for rounding. From nothing to 1e-4 more the iterations do not change.
+const HAT_DIAGONAL_FACTOR: f64 = 1.0 + 1e-5;
 
 /// Coupling over the diagonal from which two unknowns stay in one part of the incomplete factor.
 const STRONG: f64 = 0.25;
@@ -137,7 +137,7 @@ impl TwoLevelAnalysis {
     }
 }
 
-/// Where the diagonal entries of coarse unknowns stand that have shares of unknowns: of hats.
+/// Where the diagonal entries of hats stand, the coarse unknowns with a weight other than one.
 fn shared_diagonal(transfer: &Transfer, structure: &CsrStructure) -> Vec<u32> {
     let has_shares = transfer.has_shares();
     let diagonal = |row: usize| structure.row(row).find(|&k| structure.columns[k] as usize == row);
@@ -197,12 +197,16 @@ impl TwoLevel {
         let complete = |coarse: CsrMatrix<c64>| Scaled::complete(&analysis.coarse, &coarse, None);
         let (coarse, smoother) = match &analysis.smoother {
             SmootherAnalysis::Incomplete { incomplete, restricted, raised } => {
-                let restricted = transfer.restricted_matrix(restricted, matrix);
-                let mut coarse = transfer.matrix_of_restricted(structure, &restricted);
-                raised.iter().for_each(|&k| coarse.values[k as usize] *= RAISED);
-                let restricted = single(&restricted);
+                // Of both matrices in double precision neither is there beside a factor that it is no part of.
+                let (coarse, restricted) = {
+                    let restricted = transfer.restricted_matrix(restricted, matrix);
+                    let mut coarse = transfer.matrix_of_restricted(structure, &restricted);
+                    raised.iter().for_each(|&k| coarse.values[k as usize] *= HAT_DIAGONAL_FACTOR);
+                    (coarse, single(&restricted))
+                };
+                let coarse = complete(coarse)?;
                 let incomplete = Unscaled::new(incomplete, matrix, DIAGONAL_FACTOR)?;
-                (complete(coarse)?, Smoother::Incomplete(incomplete, restricted))
+                (coarse, Smoother::Incomplete(incomplete, restricted))
             }
             SmootherAnalysis::GaussSeidel(own) => {
                 let coarse = complete(transfer.coarse_matrix(structure, matrix))?;
