@@ -400,13 +400,14 @@ fn faces_at_right_angles_do_not_mix_however_a_block_is_turned() {
             let [x, y, z] = [cos * x[0] - sin * x[1], sin * x[0] + cos * x[1], x[2]];
             [x, cos * y - sin * z, sin * y + cos * z]
         });
-        let faces: Vec<_> =
-            ["x_max", "y_max", "z_max"].iter().flat_map(|face| outward(&mesh, face)).collect();
+        let faces: Vec<_> = ["x_max", "y_max", "z_max"].iter().flat_map(|f| outward(&mesh, f)).collect();
         let setup = DesignSetup::new(&faces, Direction::Normal);
         build(&mesh, &DesignSetup { control: Control::Filter(0.7), ..setup })
     };
     let upright = turned(0.0);
-    [1e-7, 0.5, std::f64::consts::FRAC_PI_2, 2.1].map(|angle| assert_same_rows(&upright, &turned(angle)));
+    for angle in [1e-7, 0.5, std::f64::consts::FRAC_PI_2, 2.1] {
+        assert_same_rows(&upright, &turned(angle));
+    }
 }
 
 /// Half of a quarter, below the diagonal, over which the triangles of a block are mirror images: images of images are the other
