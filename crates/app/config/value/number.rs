@@ -124,9 +124,12 @@ impl Value<Whole> for usize {
                 ),
             },
             Content::Float(value) if value.fract() == 0.0 => {
-                let message = format!("`{}` is {}, written as a real number", entry.path, written(value));
-                let is_possible = (least as f64..=most as f64).contains(&value);
-                entry.wrong(message, &expected, is_possible.then(|| format!("write {}", value as usize)));
+                let (why, help) = if (least as f64..=most as f64).contains(&value) {
+                    ("written as a real number", Some(format!("write {}", value as usize)))
+                } else {
+                    ("which is out of range", None)
+                };
+                entry.wrong(format!("`{}` is {}, {why}", entry.path, written(value)), &expected, help);
             }
             ref other => {
                 let message = format!("`{}` is {}, not a whole number", entry.path, other.describe());
