@@ -220,7 +220,7 @@ impl Discretisation {
         let dofs = &self.unknowns.dofs;
         let all: Vec<u32> = (0..dofs.count() as u32).collect();
         let aggregates = |passes| aggregation::aggregates(dofs, &all, matrix, passes);
-        if weak_form.reluctivity_contrast() < hats::RELUCTIVITY_CONTRAST {
+        if dofs.count() < hats::UNKNOWNS || weak_form.reluctivity_contrast() < hats::RELUCTIVITY_CONTRAST {
             return Ok(aggregation::prolongation(aggregates(aggregation::PASSES)));
         }
         let nodes = hats::Nodes {

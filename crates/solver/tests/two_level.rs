@@ -56,12 +56,12 @@ fn hardly_grows(order: Order, plate: Material, refinements: [f64; 3], most: usiz
     assert!(counts[2] <= counts[0] + counts[0] / 2, "{counts:?}");
 }
 
-/// The incomplete factor alone needs more than five hundred iterations on the largest of these meshes, two levels without hats 49, 54
-/// and 58.
+/// The incomplete factor alone needs more than five hundred iterations on the largest of these meshes, two levels without hats 54, 58
+/// and 63.
 #[test]
 fn the_iterations_of_linear_elements_hardly_grow_with_the_mesh() {
-    hardly_grows(Order::Linear, STEEL, [0.5, 0.75, 1.0], 42);
-    hardly_grows(Order::Linear, UNMAGNETIC, [0.5, 0.75, 1.0], 33);
+    hardly_grows(Order::Linear, STEEL, [0.75, 1.0, 1.3], 42);
+    hardly_grows(Order::Linear, UNMAGNETIC, [0.75, 1.0, 1.3], 33);
 }
 
 /// 69, 80 and 79 on 98 573, 110 957 and 150 477 unknowns; with an incomplete factor as smoother some 300.
