@@ -125,7 +125,9 @@ fn form_of_a_number(value: &toml::Value, message: &str) -> Option<&'static str> 
     let is_text = |value: &toml::Value| value.is_str();
     match value {
         toml::Value::Datetime(_) => Some("a date where a text is asked for"),
-        toml::Value::Float(number) if number.fract() == 0.0 && message.contains("not a whole number") => {
+        toml::Value::Float(number)
+            if number.fract() == 0.0 && message.contains("written as a real number") =>
+        {
             Some("a whole number written with a point")
         }
         toml::Value::Array(items) if message.contains("has no length") => {
