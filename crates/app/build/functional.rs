@@ -353,17 +353,27 @@ fn regions_of(body: &config::ForceBody, mesh: &Mesh) -> Result<Vec<RegionId>, Me
     body.regions.iter().map(|name| mesh.topology().region(name)).collect()
 }
 
-/// Elements that must not move, with the key path of the region they observe.
+/// Elements that must not move, for they are observed.
+pub(super) struct FixedElements {
+    pub(super) elements: Vec<ElementId>,
+    /// The key path of the region.
+    pub(super) path: String,
+    /// Whether they are those of an expansion, whose places follow no cells.
+    pub(super) is_of_terms: bool,
+}
+
+/// Elements that must not move, by functional.
 pub(super) fn fixed_elements(
     config: &Config,
     meshes: [&Mesh; 2],
     states: &[FieldModel],
-) -> Result<Vec<(String, Vec<ElementId>)>, Error> {
+) -> Result<Vec<FixedElements>, Error> {
     let of_field = functionals(config).into_iter().filter(|(_, functional)| functional.kind.is_of_field());
     of_field
         .map(|(path, functional)| {
             let elements = term(config, functional, meshes, states)?.functional.fixed_elements().collect();
-            Ok((format!("{path}.region"), elements))
+            let is_of_terms = functional.kind.is_of_terms();
+            Ok(FixedElements { elements, path: format!("{path}.region"), is_of_terms })
         })
         .collect()
 }

@@ -15,6 +15,7 @@ use fluxmorph_solver::FieldModel;
 
 use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
 use super::entries::{is_air, material};
+use super::functional::FixedElements;
 use super::outline::same_nodes;
 use super::plausible;
 use super::soundness::unit_warning;
@@ -261,7 +262,7 @@ pub(super) fn shape(
     config: &Config,
     body: Body,
     models: &[FieldModel],
-    observed: &[(String, Vec<ElementId>)],
+    observed: &[FixedElements],
 ) -> Result<Shape, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
     let Body { full_surface, surface, motion } = body;
@@ -363,14 +364,13 @@ fn overlap_faults(
     inputs: &Inputs<'_>,
     moving: &[ElementId],
     models: &[FieldModel],
-    observed: &[(String, Vec<ElementId>)],
+    observed: &[FixedElements],
 ) -> Vec<Diagnostic> {
     let Inputs { source, mesh, .. } = *inputs;
     let moves = |e: &ElementId| moving.binary_search(e).is_ok();
     let mut faults = Vec::new();
-    for (path, _) in observed.iter().filter(|(_, elements)| elements.iter().any(moves)) {
-        // Places of an expansion follow no cells.
-        let (follow, instead) = if path.starts_with("multipoles[") {
+    for own in observed.iter().filter(|own| own.elements.iter().any(moves)) {
+        let (follow, instead) = if own.is_of_terms {
             ("follow = \"space\", for places that stay", "take a smaller radius, or take")
         } else {
             (
@@ -378,7 +378,8 @@ fn overlap_faults(
                 "or take",
             )
         };
-        let fault = source.diagnostic(path, "the mesh moves where the field is observed").expected(follow);
+        let fault =
+            source.diagnostic(&own.path, "the mesh moves where the field is observed").expected(follow);
         faults.push(fault.help(format!("{instead} the region out of remesh.region, or shrink remesh.box")));
     }
     if let Some(e) = models[0].open_elements().find(moves) {

@@ -1,7 +1,5 @@
 //! One analysis with its directory: the field of a single design.
 
-use std::time::Instant;
-
 use fluxmorph_optimizer::driver::Watching;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, Problem, SolverCache, Stage};
 use fluxmorph_remesh::Moved;
@@ -14,7 +12,7 @@ use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
 use super::reported;
 use super::summary::{constraints, design_result, enter_errors, homogeneity, terms};
-use super::{Options, Session};
+use super::{Options, Session, timed};
 use crate::build::{Mode, memory_limit};
 use crate::config::{Config, FieldsKept, SourceMap};
 use crate::error::Error;
@@ -196,12 +194,4 @@ impl Session<'_> {
         };
         (accuracy, of_states)
     }
-}
-
-/// Does the work, and adds its wall time to `seconds` [s].
-fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> T) -> T {
-    let clock = Instant::now();
-    let found = work();
-    *seconds += clock.elapsed().as_secs_f64();
-    found
 }

@@ -246,19 +246,11 @@ impl Discretisation {
     /// What the unknowns of quadratic nodal elements are ordered by: the ends of their edges, each component's for itself, for
     /// most do not couple. `None` for all others: of edge elements the factor would be a third larger than by the matrix graph.
     pub(crate) fn hosts(&self) -> Option<Hosts> {
-        let dofs = &self.unknowns.dofs;
-        let mut hosts = match (self.space.family(), self.space.order()) {
-            (ElementFamily::Nodal, Order::Quadratic) => vec![[0; 2]; dofs.count()],
-            _ => return None,
-        };
-        for carrier in (0..self.space.carrier_count()).map(CarrierId::new) {
-            for c in 0..4 {
-                if let Some(equation) = dofs.equation(carrier, c) {
-                    hosts[equation] = self.space.vertices_of(carrier).map(|v| (4 * v.index() + c) as u32);
-                }
-            }
+        if (self.space.family(), self.space.order()) != (ElementFamily::Nodal, Order::Quadratic) {
+            return None;
         }
-        Some(Hosts::new(hosts))
+        let host = |(carrier, c)| self.space.vertices_of(carrier).map(|v| (4 * v.index() + c) as u32);
+        Some(Hosts::new(self.unknowns.dofs.places().map(host).collect()))
     }
 
     /// Which rows change while some elements move, and with the state, by equation; `None` where none moves.

@@ -80,8 +80,7 @@ pub fn prolongation(
 
 /// The components of `A` of the columns of [`prolongation`] with [`ScalarSpace::Quadratic`], without those of `ψ`, which follow.
 pub(crate) fn components(coarse: &Unknowns) -> Vec<usize> {
-    let of_node = |node| (0..PSI).filter(move |&c| coarse.dofs.equation(node, c).is_some());
-    (0..coarse.dofs.carrier_count()).map(CarrierId::new).flat_map(of_node).collect()
+    coarse.dofs.places().map(|place| place.1).filter(|&c| c != PSI).collect()
 }
 
 /// The unknowns of first-order edge elements as unknowns of second-order ones, whose functions they are too; shape

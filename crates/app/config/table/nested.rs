@@ -58,13 +58,17 @@ impl<'a> Entry<'a> {
     pub(in crate::config) fn section(&self) -> Option<Section<'a>> {
         let path = &self.path;
         let Content::Table(table) = &self.node.content else {
-            let message = format!("`{path}` is {}, not a table", self.node.content.describe());
-            let help = matches!(self.node.content, Content::Array(_))
-                .then(|| format!("write [{path}] with single brackets, once"));
-            self.wrong(message, &format!("a table: [{path}]"), help);
+            self.not_a_table(&format!("a table: [{path}]"), &format!("[{path}] with single brackets, once"));
             return None;
         };
         Some(Section::new(path.clone(), table, self.node.span.clone(), self.context))
+    }
+
+    /// Faults a value that is no table, with what to write in place of a list of tables.
+    fn not_a_table(&self, expected: &str, single: &str) {
+        let message = format!("`{}` is {}, not a table", self.path, self.node.content.describe());
+        let help = matches!(self.node.content, Content::Array(_)).then(|| format!("write {single}"));
+        self.wrong(message, expected, help);
     }
 }
 
@@ -95,11 +99,6 @@ impl<T: Group> Value<Tables> for Vec<T> {
     }
 }
 
-/// The head of a table with a name of the user's, as it stands in a file.
-fn named_table_head(path: &str) -> String {
-    format!("[{path}.NAME]")
-}
-
 /// Values by names of the user's: tables `[key.NAME]`, or `key = { NAME = value }`.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::config) struct ByName<K>(pub(in crate::config) K);
@@ -112,30 +111,17 @@ impl<K: Kind> Kind for ByName<K> {
 
 impl<K: Kind, T: Value<K>> Value<ByName<K>> for BTreeMap<String, T> {
     fn read(ByName(kind): &ByName<K>, entry: &Entry<'_>) -> Option<Self> {
-        let Content::Table(tables) = &entry.node.content else {
-            match kind.dimension() {
-                Some(dimension) => {
-                    let message =
-                        format!("`{}` is {}, not a table", entry.path, entry.node.content.describe());
-                    entry.wrong(
-                        message,
-                        &format!("names with values: {{ NAME = \"{}\" }}", dimension.example()),
-                        None,
-                    );
-                }
-                None => {
-                    let message =
-                        format!("`{}` is {}, not a table", entry.path, entry.node.content.describe());
-                    let help = matches!(entry.node.content, Content::Array(_)).then(|| {
-                        format!("write {} with single brackets, once for each", named_table_head(&entry.path))
-                    });
-                    entry.wrong(
-                        message,
-                        &format!("a table for each name: {}", named_table_head(&entry.path)),
-                        help,
-                    );
-                }
+        let named_table = format!("[{}.NAME]", entry.path);
+        // Values with a dimension stand behind their names, all others are tables.
+        let (expected, is_of_tables) = match kind.dimension() {
+            Some(dimension) => {
+                (format!("names with values: {{ NAME = \"{}\" }}", dimension.example()), false)
             }
+            None => (format!("a table for each name: {named_table}"), true),
+        };
+        let single = format!("{named_table} with single brackets, once for each");
+        let Content::Table(tables) = &entry.node.content else {
+            entry.not_a_table(&expected, &single);
             return None;
         };
         let named = |(name, node): (&String, _)| {
@@ -145,13 +131,8 @@ impl<K: Kind, T: Value<K>> Value<ByName<K>> for BTreeMap<String, T> {
                 item.wrong(message, "a name that is not empty, without control characters", None);
                 return None;
             }
-            if kind.dimension().is_none() && !matches!(item.node.content, Content::Table(_)) {
-                let message = format!("`{}` is {}, not a table", item.path, item.node.content.describe());
-                item.wrong(
-                    message,
-                    &format!("a table for each name: {}", named_table_head(&entry.path)),
-                    None,
-                );
+            if is_of_tables && !matches!(item.node.content, Content::Table(_)) {
+                item.not_a_table(&expected, &single);
                 return None;
             }
             Some((name.clone(), T::read(kind, &item)?))

@@ -59,6 +59,15 @@ impl<const C: usize> DofMap<C> {
         (equation != NOT_AN_UNKNOWN).then_some(equation as usize)
     }
 
+    /// Carrier and component of every equation, in their order.
+    pub fn places(&self) -> impl Iterator<Item = (CarrierId, usize)> + '_ {
+        let of_carrier = |(i, equations): (usize, &[u32; C])| {
+            let equations = *equations;
+            (0..C).filter(move |&c| equations[c] != NOT_AN_UNKNOWN).map(move |c| (CarrierId::new(i), c))
+        };
+        self.equations.iter().enumerate().flat_map(of_carrier)
+    }
+
     /// Bit `c` is set where component `c` at `carrier` is an unknown.
     #[inline]
     pub fn unknown_bits(&self, carrier: impl Into<CarrierId>) -> u16 {
@@ -103,6 +112,8 @@ mod tests {
         assert_eq!(dofs.equation(CarrierId(1), 0), None);
         assert_eq!(dofs.equation(CarrierId(1), 1), Some(2));
         assert_eq!(dofs.unknown_bits(CarrierId(1)), 0b10);
+        let places: Vec<_> = dofs.places().map(|(carrier, c)| dofs.equation(carrier, c)).collect();
+        assert_eq!(places, [Some(0), Some(1), Some(2), Some(3), Some(4)]);
         let values = [1.0, 2.0, 3.0, 4.0, 5.0];
         assert_eq!(dofs.gather(&values, CarrierId(1)), [0.0, 3.0]);
         let mut sum = [0.0; 5];

@@ -13,7 +13,6 @@
 
 use std::sync::Arc;
 
-use fluxmorph_geometry::CarrierId;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, DofMap, c64};
 use fluxmorph_geometry::parallel::Aggregates;
@@ -56,14 +55,7 @@ pub(crate) fn aggregates(
     matrix: &CsrMatrix<c64>,
     passes: usize,
 ) -> Aggregates {
-    let mut component = vec![PSI; dofs.count()];
-    for node in (0..dofs.carrier_count()).map(CarrierId::new) {
-        for c in 0..PSI {
-            if let Some(equation) = dofs.equation(node, c) {
-                component[equation] = c;
-            }
-        }
-    }
+    let component: Vec<usize> = dofs.places().map(|place| place.1).collect();
     of_components(&component, owned, matrix, passes)
 }
 

@@ -18,7 +18,6 @@ use fluxmorph_geometry::tet4::{Point, dot, norm};
 use fluxmorph_geometry::{CarrierId, eigen_decomposition};
 
 use crate::fixed_directions::Frame;
-use crate::unknowns::PSI;
 
 /// The largest reluctivity over the smallest from which hats pay. On a plate of 51 000 and 210 000 unknowns factor, state and adjoint
 /// take 1.19 and 1.13 of the time with aggregates alone at 3, 0.98 and 1.02 at 10, 0.76 and 0.67 at 100.
@@ -67,16 +66,8 @@ pub(crate) fn prolongation<'f>(
 ) -> CsrMatrix<f64> {
     let grid = Grid::new(nodes);
     let corners: Vec<[(usize, f64); 4]> = nodes.points.iter().map(|&point| grid.corners(point)).collect();
-    let mut place = vec![(CarrierId::new(0), PSI); dofs.count()];
-    for node in (0..dofs.carrier_count()).map(CarrierId::new) {
-        for c in 0..PSI {
-            if let Some(equation) = dofs.equation(node, c) {
-                place[equation] = (node, c);
-            }
-        }
-    }
-    // Hat and weight; in a frame of its own a component has a share of those of all coordinates.
-    let hats = |&(node, c): &(CarrierId, usize)| {
+    // Hat and weight, of ψ none; in a frame of its own a component has a share of those of all coordinates.
+    let hats = |(node, c): (CarrierId, usize)| {
         let axis = (nodes.frame)(node).map_or(Frame::COORDINATES.axes, |frame| frame.axes).get(c).copied();
         let own = axis.into_iter().flat_map(move |axis| (0..3).map(move |d| (d, axis[d])));
         let corners = &corners[node.index()];
@@ -84,7 +75,7 @@ pub(crate) fn prolongation<'f>(
             .filter(|hat| hat.1 != 0.0)
     };
     let mut unknowns = vec![0; 3 * grid.vertex_count()];
-    place.iter().flat_map(hats).for_each(|hat| unknowns[hat.0] += 1);
+    dofs.places().flat_map(hats).for_each(|hat| unknowns[hat.0] += 1);
     let mut count = aggregates.count as u32;
     let number = |unknowns: u32| {
         let column = if unknowns >= LEAST_UNKNOWNS { count } else { NONE };
@@ -92,13 +83,13 @@ pub(crate) fn prolongation<'f>(
         column
     };
     let columns: Vec<u32> = unknowns.into_iter().map(number).collect();
-    let row = |(place, &aggregate): (&(CarrierId, usize), &u32)| {
+    let row = |(place, &aggregate): ((CarrierId, usize), &u32)| {
         let mut row = vec![(aggregate as usize, 1.0)];
         row.extend(hats(place).map(|(hat, weight)| (columns[hat] as usize, weight)));
         row.retain(|entry| entry.0 != NONE as usize);
         row
     };
-    CsrMatrix::from_rows(count as usize, place.iter().zip(&aggregates.of_row).map(row))
+    CsrMatrix::from_rows(count as usize, dofs.places().zip(&aggregates.of_row).map(row))
 }
 
 /// The axes along which the normals of a surface lie, of the area vectors [m²] of its triangles: the eigenvectors of the sum of `n nᵀ`.
@@ -192,6 +183,7 @@ fn merged(values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::unknowns::PSI;
 
     const COORDINATES: [Point; 3] = Frame::COORDINATES.axes;
 

@@ -90,11 +90,7 @@ impl TwoLevelAnalysis {
             _ => {
                 let restricted = transfer.restricted_structure(&matrix.structure);
                 let structure = transfer.structure_of_restricted(&restricted);
-                let raised = if elements.1 == Order::Linear {
-                    shared_diagonal(&transfer, &structure)
-                } else {
-                    Vec::new()
-                };
+                let raised = shared_diagonal(&transfer, &structure);
                 let incomplete = incomplete_analysis(matrix);
                 (structure, SmootherAnalysis::Incomplete { incomplete, restricted, raised })
             }
