@@ -20,9 +20,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 
 # Configuration and settings of [mesh.shield]; numbers are tetrahedra.
-THIN = ["refinement=0.3", "growth=2.5", "skin=[4e-4,1.2e-3,2.5e-3,5e-3]", "side_skin=[1e-3,4e-3]"]
 MESHES = {
-    "meshed 14k": ("shield", THIN),
+    "meshed 73k": ("shield", []),
     "meshed 103k": ("shield", ["refinement=1.3"]),
     "meshed 406k": ("shield", ["refinement=1.6"]),
     "meshed 1M": ("shield", ["refinement=2.5", "growth=2.1"]),

@@ -85,7 +85,7 @@ pub enum Progress {
 #[derive(Debug, Args)]
 pub struct WorkArgs {
     /// Threads to use [default: all]; the results do not depend on it
-    #[arg(long, value_name = "N", value_parser = threads)]
+    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
 
     /// How progress is shown on standard error

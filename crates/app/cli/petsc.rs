@@ -7,11 +7,12 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::fem::csr::CsrStructure;
+use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use fluxmorph_geometry::parallel::{
     Communicator, DistributedSolver, Krylov, Preconditioning, Rows, Solved, SolverOptions, SubSolver,
 };
-use fluxmorph_petsc::petsc::{Petsc, Settings, Shape, Solver};
+use fluxmorph_petsc::petsc::{Coarse, Petsc, Settings, Shape, Solver};
 
 use crate::exit_code::ExitCode;
 
@@ -108,7 +109,7 @@ impl PetscSolver {
         for (name, value) in &*field_options {
             petsc.set_option_default(&with_prefix(&prefix, name), value)?;
         }
-        for (name, value) in solver_options(options, rows.aggregates.is_some()) {
+        for (name, value) in solver_options(options, rows.coarse.is_some()) {
             petsc.set_option_default(&format!("-{prefix}{name}"), &value)?;
         }
         let (structure, layout) = (&rows.structure, &rows.layout);
@@ -122,8 +123,13 @@ impl PetscSolver {
             counts[1].push((columns.len() - inside) as i32);
         }
         let [inside, outside] = &counts;
-        let aggregates = rows.aggregates.as_ref().map(|coarse| (coarse.of_row.as_slice(), coarse.count));
-        let shape = Shape { count: layout.count(), inside, outside, aggregates };
+        let coarse = rows.coarse.as_ref().map(|coarse| {
+            let CsrMatrix { structure, values } = &coarse.prolongation;
+            let CsrStructure { row_starts, columns, column_count } = &**structure;
+            let [own, shared] = [coarse.own, column_count - coarse.own];
+            Coarse { row_starts, columns, weights: values, own, shared, raise: coarse.raise }
+        });
+        let shape = Shape { count: layout.count(), inside, outside, coarse };
         let settings = Settings {
             tolerance: options.tolerance,
             max_iterations: options.max_iterations,

@@ -168,6 +168,15 @@ int fm_option_used(const char *name) {
 
 /* ---- solvers ---- */
 
+/* The prolongation from a coarse space onto own rows: entries of row i are at starts[i] .. starts[i + 1]. Columns below `own` are
+ * this rank's, the `shared` ones after them those of all ranks; what the diagonal of these is multiplied by is `raise`. */
+typedef struct {
+    const uint32_t *starts, *columns;
+    const double *weights;
+    int64_t own, shared;
+    double raise;
+} fm_coarse_space;
+
 typedef struct {
     Mat matrix;
     KSP ksp;
@@ -179,6 +188,10 @@ typedef struct {
     Mat prolongation, coarse_matrix;
     KSP coarse;
     Vec rest, restricted, correction;
+    /* Of the coarse columns of this rank, how many are its own, how many there are, and what the diagonal of the others is
+     * multiplied by. */
+    PetscInt coarse_own, coarse_here;
+    PetscReal raise;
     PetscInt own, first;
     PetscReal tolerance;
     int most;
@@ -245,22 +258,57 @@ static PetscErrorCode apply_two_levels(PC pc, Vec right_side, Vec solution) {
     return 0;
 }
 
-/* Row i of the prolongation has its one entry, 1, in column aggregates[i] of this rank's; no rank waits for another. */
-static PetscErrorCode insert_aggregates(fm_solver *solver, const uint32_t *aggregates) {
-    PetscInt first = 0;
-    TRY(MatGetOwnershipRangeColumn(solver->prolongation, &first, NULL));
+/* The first of the shared columns that a rank holds, of `shared` that are spread over `size` ranks. */
+static PetscInt first_shared(PetscInt shared, int size, int rank) {
+    return (PetscInt)((int64_t)shared * rank / size);
+}
+
+/* Inserts the rows of the prolongation; no rank waits for another. Every rank has its own columns first and its part of the
+ * shared ones behind them. */
+static PetscErrorCode insert_prolongation(fm_solver *solver, const fm_coarse_space *space, int size) {
+    const PetscInt *ranges = NULL;
+    TRY(MatGetOwnershipRangesColumn(solver->prolongation, &ranges));
+    int rank = 0;
+    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    PetscInt own = (PetscInt)space->own, shared = (PetscInt)space->shared;
     for (PetscInt row = 0; row < solver->own; row++) {
-        TRY(MatSetValue(solver->prolongation, solver->first + row, first + (PetscInt)aggregates[row], 1.0, INSERT_VALUES));
+        int holder = 0;
+        for (uint32_t k = space->starts[row]; k < space->starts[row + 1]; k++) {
+            PetscInt column = (PetscInt)space->columns[k], global = ranges[rank] + column;
+            if (column >= own) {
+                while (column - own < first_shared(shared, size, holder)) {
+                    holder--;
+                }
+                while (column - own >= first_shared(shared, size, holder + 1)) {
+                    holder++;
+                }
+                global = ranges[holder + 1] - (first_shared(shared, size, holder + 1) - (column - own));
+            }
+            TRY(MatSetValue(solver->prolongation, solver->first + row, global, space->weights[k], INSERT_VALUES));
+        }
     }
     return 0;
 }
 
-/* Puts a second level behind the preconditioner that the options name, with the `count` aggregates of this rank and those of the
- * others. The coarse solver is called as the solver itself, with `coarse_`. */
-static int add_coarse_level(fm_solver *solver, const char *prefix, const uint32_t *aggregates, int64_t count) {
-    TRY(MatCreateAIJ(PETSC_COMM_WORLD, solver->own, (PetscInt)count, PETSC_DETERMINE, PETSC_DETERMINE, 1, NULL, 0, NULL,
-                     &solver->prolongation));
-    if (agree(insert_aggregates(solver, aggregates))) {
+/* Puts a second level behind the preconditioner that the options name. The coarse solver is called as the solver itself, with
+ * `coarse_`. */
+static int add_coarse_level(fm_solver *solver, const char *prefix, const fm_coarse_space *space) {
+    int rank = 0, size = 1;
+    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
+    MPI_Comm_size(PETSC_COMM_WORLD, &size);
+    PetscInt shared = (PetscInt)space->shared;
+    solver->coarse_own = (PetscInt)space->own;
+    solver->coarse_here = solver->coarse_own + first_shared(shared, size, rank + 1) - first_shared(shared, size, rank);
+    solver->raise = space->raise;
+    PetscInt *entries = NULL;
+    TRY(PetscMalloc1(solver->own + 1, &entries));
+    for (PetscInt row = 0; row < solver->own; row++) {
+        entries[row] = (PetscInt)(space->starts[row + 1] - space->starts[row]);
+    }
+    TRY(MatCreateAIJ(PETSC_COMM_WORLD, solver->own, solver->coarse_here, PETSC_DETERMINE, PETSC_DETERMINE, 0, entries, 0,
+                     shared == 0 ? NULL : entries, &solver->prolongation));
+    TRY(PetscFree(entries));
+    if (agree(insert_prolongation(solver, space, size))) {
         return 1;
     }
     TRY(MatAssemblyBegin(solver->prolongation, MAT_FINAL_ASSEMBLY));
@@ -284,7 +332,7 @@ static int add_coarse_level(fm_solver *solver, const char *prefix, const uint32_
 }
 
 static int create(fm_solver *solver, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
-                double tolerance, int max_iterations, int symmetric, const uint32_t *aggregates, int64_t aggregate_count) {
+                double tolerance, int max_iterations, int symmetric, const fm_coarse_space *coarse) {
     PetscInt own = solver->own;
     if (count > (int64_t)PETSC_MAX_INT) {
         say("more equations than this PETSc can number: it needs one configured with --with-64-bit-indices");
@@ -322,14 +370,14 @@ static int create(fm_solver *solver, int64_t count, const int32_t *inside, const
     TRY(KSPSetOptionsPrefix(solver->ksp, prefix));
     TRY(KSPSetTolerances(solver->ksp, tolerance, 0.0, PETSC_DEFAULT, max_iterations));
     TRY(KSPSetFromOptions(solver->ksp));
-    return aggregates == NULL ? 0 : add_coarse_level(solver, prefix, aggregates, aggregate_count);
+    return coarse == NULL ? 0 : add_coarse_level(solver, prefix, coarse);
 }
 
 /* A solver for `count` equations, of which this rank owns `own`; `inside` and `outside` are the entries of each own row in
- * the columns of this rank and in those of others; `symmetric` for the iteration of `cocg`; `aggregates` of the own rows, or
- * NULL for one level. */
+ * the columns of this rank and in those of others; `symmetric` for the iteration of `cocg`; `coarse` is NULL for one
+ * level. */
 int fm_solver_create(int64_t own, int64_t count, const int32_t *inside, const int32_t *outside, const char *prefix,
-                     double tolerance, int max_iterations, int symmetric, const uint32_t *aggregates, int64_t aggregate_count,
+                     double tolerance, int max_iterations, int symmetric, const fm_coarse_space *coarse,
                      fm_solver **created) {
     message[0] = 0;
     fm_solver *solver = calloc(1, sizeof *solver);
@@ -339,7 +387,7 @@ int fm_solver_create(int64_t own, int64_t count, const int32_t *inside, const in
         return 1;
     }
     solver->own = (PetscInt)own;
-    return create(solver, count, inside, outside, prefix, tolerance, max_iterations, symmetric, aggregates, aggregate_count);
+    return create(solver, count, inside, outside, prefix, tolerance, max_iterations, symmetric, coarse);
 }
 
 /* The name of what KSPSolve ended with. */
@@ -382,10 +430,27 @@ static PetscErrorCode check_preconditioner(PC pc, const char *what, failure *fou
     return 0;
 }
 
+/* Multiplies the diagonal entries of the shared columns. */
+static PetscErrorCode raise_diagonal(fm_solver *solver) {
+    if (solver->raise == 1.0) {
+        return 0;
+    }
+    PetscScalar *entries = NULL;
+    TRY(MatGetDiagonal(solver->coarse_matrix, solver->correction));
+    TRY(VecGetArray(solver->correction, &entries));
+    for (PetscInt column = solver->coarse_own; column < solver->coarse_here; column++) {
+        entries[column] *= solver->raise;
+    }
+    TRY(VecRestoreArray(solver->correction, &entries));
+    TRY(MatDiagonalSet(solver->coarse_matrix, solver->correction, INSERT_VALUES));
+    return 0;
+}
+
 /* Factors what the second level has of the matrix. */
 static PetscErrorCode set_up_coarse_level(fm_solver *solver, failure *found) {
     MatReuse reuse = solver->coarse_matrix == NULL ? MAT_INITIAL_MATRIX : MAT_REUSE_MATRIX;
     TRY(MatPtAP(solver->matrix, solver->prolongation, reuse, PETSC_DEFAULT, &solver->coarse_matrix));
+    TRY(raise_diagonal(solver));
     TRY(MatSetOption(solver->coarse_matrix, MAT_SYMMETRIC, PETSC_TRUE));
     TRY(KSPSetOperators(solver->coarse, solver->coarse_matrix, solver->coarse_matrix));
     TRY(KSPSetUp(solver->coarse));

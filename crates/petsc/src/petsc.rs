@@ -18,6 +18,17 @@ struct RawSolver {
     _private: [u8; 0],
 }
 
+/// A [`Coarse`] as `bridge.c` has it.
+#[repr(C)]
+struct RawCoarse {
+    starts: *const u32,
+    columns: *const u32,
+    weights: *const c_double,
+    own: i64,
+    shared: i64,
+    raise: c_double,
+}
+
 unsafe extern "C" {
     fn fm_message() -> *const c_char;
     fn fm_start() -> c_int;
@@ -42,8 +53,7 @@ unsafe extern "C" {
         tolerance: c_double,
         max_iterations: c_int,
         symmetric: c_int,
-        aggregates: *const u32,
-        aggregate_count: i64,
+        coarse: *const RawCoarse,
         created: *mut *mut RawSolver,
     ) -> c_int;
     fn fm_solver_set(
@@ -212,7 +222,7 @@ impl Petsc {
     /// What PETSc says.
     ///
     /// # Panics
-    /// Unless `inside`, `outside` and the aggregates have one number a row.
+    /// Unless `inside`, `outside` and the coarse space have the same rows, and this one no other columns than its own.
     pub fn solver(&self, shape: &Shape<'_>, prefix: &str, settings: &Settings) -> Result<Solver, String> {
         Solver::new(Arc::clone(&self.session), shape, prefix, settings)
     }
@@ -239,8 +249,50 @@ pub struct Shape<'a> {
     pub inside: &'a [i32],
     /// Entries of every own row in columns of other ranks.
     pub outside: &'a [i32],
-    /// The aggregate of every own row and how many this rank has, where there is a second level.
-    pub aggregates: Option<(&'a [u32], usize)>,
+    /// Where there is a second level.
+    pub coarse: Option<Coarse<'a>>,
+}
+
+/// The prolongation from a coarse space onto the rows of a rank: real, compressed by rows.
+#[derive(Clone, Copy, Debug)]
+pub struct Coarse<'a> {
+    /// Where the entries of every row begin, and where the last ones end.
+    pub row_starts: &'a [u32],
+    /// The column of every entry: first those that this rank has for itself, then those that all ranks have.
+    pub columns: &'a [u32],
+    /// Its weight.
+    pub weights: &'a [f64],
+    /// Columns that this rank has for itself.
+    pub own: usize,
+    /// Columns that all ranks have.
+    pub shared: usize,
+    /// What the diagonal entries of these are multiplied by in the coarse matrix.
+    pub raise: f64,
+}
+
+impl Coarse<'_> {
+    /// The same for `bridge.c`; it must not outlive what this refers to.
+    fn raw(&self, rows: usize) -> RawCoarse {
+        let entries = self.row_starts.last().map_or(0, |&end| end as usize);
+        assert!(self.row_starts.len() == rows + 1 && self.row_starts.is_sorted(), "one range a row");
+        assert_eq!(
+            (self.columns.len(), self.weights.len()),
+            (entries, entries),
+            "one column and weight an entry"
+        );
+        assert!(
+            self.columns.iter().all(|&column| (column as usize) < self.own + self.shared),
+            "columns there are"
+        );
+        RawCoarse {
+            starts: self.row_starts.as_ptr(),
+            columns: self.columns.as_ptr(),
+            weights: self.weights.as_ptr(),
+            own: self.own as i64,
+            shared: self.shared as i64,
+            raise: self.raise,
+        }
+    }
 }
 
 /// A solver of PETSc.
@@ -263,20 +315,15 @@ impl Solver {
         settings: &Settings,
     ) -> Result<Self, String> {
         assert_eq!(shape.inside.len(), shape.outside.len(), "one number a row");
-        let is_one_a_row = |(aggregates, _): (&[u32], usize)| aggregates.len() == shape.inside.len();
-        assert!(shape.aggregates.is_none_or(is_one_a_row), "one aggregate a row");
-        let (aggregates, aggregate_count) = match shape.aggregates {
-            Some((aggregates, count)) => (aggregates.as_ptr(), count as i64),
-            None => (std::ptr::null(), 0),
-        };
+        let coarse = shape.coarse.map(|coarse| coarse.raw(shape.inside.len()));
         let _one = calling();
         let prefix = text(prefix);
         let (tolerance, symmetric) = (settings.tolerance, c_int::from(settings.is_complex_symmetric));
         let own = shape.inside.len();
         let mut raw = std::ptr::null_mut();
         let limit = c_int::try_from(settings.max_iterations).unwrap_or(c_int::MAX);
-        // SAFETY: all arrays have one number for each of `own` rows, as asserted, or are null where that is allowed; all
-        // pointers outlive the call.
+        // SAFETY: all arrays have one number for each of `own` rows, as asserted, or those of the coarse space, which is null where
+        // there is none, as many as its ranges say; all pointers outlive the call.
         let code = unsafe {
             let (inside, outside) = (shape.inside.as_ptr(), shape.outside.as_ptr());
             let (own, count) = (own as i64, shape.count as i64);
@@ -289,8 +336,7 @@ impl Solver {
                 tolerance,
                 limit,
                 symmetric,
-                aggregates,
-                aggregate_count,
+                coarse.as_ref().map_or(std::ptr::null(), std::ptr::from_ref),
                 &mut raw,
             )
         };

@@ -174,7 +174,7 @@ impl ElasticHandler {
         });
         let values: Vec<c64> = matrix.values.iter().map(|&v| c64::from(v)).collect();
         let structure = Arc::clone(self.pattern.structure());
-        let rows = Rows { structure, layout: Arc::clone(&self.layout), aggregates: None };
+        let rows = Rows { structure, layout: Arc::clone(&self.layout), coarse: None };
         let mut matrix = DistributedMatrix::new(rows, options(self.layout.count()));
         matrix.set(&values, ranks)?;
         self.slots.insert(slot, matrix);

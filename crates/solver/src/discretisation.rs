@@ -7,7 +7,7 @@
 use fluxmorph_geometry::fem::{
     BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, Hosts, LocalMatrix, c64,
 };
-use fluxmorph_geometry::parallel::{Aggregates, Ownership, RowLayout};
+use fluxmorph_geometry::parallel::{CoarseSpace, Ownership, RowLayout};
 use fluxmorph_geometry::tet4::area_vector;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
@@ -217,30 +217,45 @@ impl Discretisation {
                 linear
             });
         }
+        let all: Vec<u32> = (0..self.unknowns.dofs.count() as u32).collect();
+        Ok(self.coarse_space(mesh, weak_form, (&all, matrix)).prolongation)
+    }
+
+    /// The coarse space of linear nodal elements on the rows of some equations, ascending, by the couplings of their matrix: ψ in full
+    /// and aggregates of `A`, with hats around iron.
+    fn coarse_space(
+        &self,
+        mesh: &Mesh,
+        weak_form: &WeakForm,
+        (rows, matrix): (&[u32], &CsrMatrix<c64>),
+    ) -> CoarseSpace {
         let dofs = &self.unknowns.dofs;
-        let all: Vec<u32> = (0..dofs.count() as u32).collect();
-        let aggregates = |passes| aggregation::aggregates(dofs, &all, matrix, passes);
+        let aggregates = |passes| aggregation::aggregates(dofs, rows, matrix, passes);
         if dofs.count() < hats::UNKNOWNS || weak_form.reluctivity_contrast() < hats::RELUCTIVITY_CONTRAST {
-            return Ok(aggregation::prolongation(aggregates(aggregation::PASSES)));
+            let aggregates = aggregates(aggregation::PASSES);
+            let own = aggregates.count;
+            return CoarseSpace { prolongation: aggregation::prolongation(aggregates), own, raise: 1.0 };
         }
         let nodes = hats::Nodes {
             points: mesh.points(),
             axes: hats::axes(weak_form.interfaces().map(|t| area_vector(t.map(|n| mesh.point(n))))),
             frame: |node| self.unknowns.frame(node),
         };
-        Ok(hats::prolongation(dofs, &nodes, &aggregates(aggregation::PASSES_BESIDE_HATS)))
+        let aggregates = aggregates(aggregation::PASSES_BESIDE_HATS);
+        let prolongation = hats::prolongation(dofs, &nodes, (rows, &aggregates));
+        CoarseSpace { prolongation, own: aggregates.count, raise: hats::DIAGONAL_FACTOR }
     }
 
-    /// The coarse space of the rows of this rank, by the couplings of their matrix; linear nodal elements alone have one.
-    pub(crate) fn aggregates(
+    /// The coarse space of the rows of this rank, by the couplings of the matrix that it assembles; linear nodal elements alone have
+    /// one.
+    pub(crate) fn coarse_space_of(
         &self,
         layout: &RowLayout,
-        matrix: impl FnOnce() -> CsrMatrix<c64>,
-    ) -> Option<Aggregates> {
-        let is_aggregated =
-            (self.space.family(), self.space.order()) == (ElementFamily::Nodal, Order::Linear);
-        let (dofs, owned) = (&self.unknowns.dofs, layout.owned());
-        is_aggregated.then(|| aggregation::aggregates(dofs, owned, &matrix(), aggregation::PASSES))
+        weak_form: &WeakForm,
+        mesh: &Mesh,
+    ) -> Option<CoarseSpace> {
+        let has_one = (self.space.family(), self.space.order()) == (ElementFamily::Nodal, Order::Linear);
+        has_one.then(|| self.coarse_space(mesh, weak_form, (layout.owned(), &self.assemble(weak_form, mesh))))
     }
 
     /// What the unknowns of quadratic nodal elements are ordered by: the ends of their edges, each component's for itself, for

@@ -58,7 +58,11 @@ impl<'a> Entry<'a> {
     pub(in crate::config) fn section(&self) -> Option<Section<'a>> {
         let path = &self.path;
         let Content::Table(table) = &self.node.content else {
-            self.not_a_table(&format!("a table: [{path}]"), &format!("[{path}] with single brackets, once"));
+            let (header, single) = match path.strip_suffix(']').and_then(|path| path.rsplit_once('[')) {
+                Some((list, _)) => (format!("[[{list}]]"), format!("[[{list}]] once for each")),
+                None => (format!("[{path}]"), format!("[{path}] with single brackets, once")),
+            };
+            self.not_a_table(&format!("a table: {header}"), &single);
             return None;
         };
         Some(Section::new(path.clone(), table, self.node.span.clone(), self.context))

@@ -34,6 +34,7 @@ pub(super) fn diagnostics(document: usize, text: &str, errors: &[toml::de::Error
             Diagnostic::new("", Span { document, range: range.clone() }, format!("not valid TOML: {said}"));
         found.push(match advice(text, &range, line) {
             _ if is_duplicate => duplicate(diagnostic, text, range),
+            _ if message.contains("multi-line") => unclosed_lines(diagnostic, text, range),
             Some(advice) => diagnostic.help(advice),
             None if follows => diagnostic.help("a list or a table above this line is not closed"),
             None => diagnostic,
@@ -54,6 +55,17 @@ fn advice(text: &str, range: &Range<usize>, line: &str) -> Option<String> {
     }
     let is_open = line.matches('"').count() % 2 == 1 && !line.contains("\"\"\"");
     is_open.then(|| "a text needs a quote at each of its ends".to_owned())
+}
+
+/// A text of several lines that is not closed, with the place where it begins.
+fn unclosed_lines(diagnostic: Diagnostic, text: &str, range: Range<usize>) -> Diagnostic {
+    let document = diagnostic.span.document;
+    let before = text.get(..range.start).unwrap_or_default();
+    let quotes = ["\"\"\"", "'''"].into_iter().filter_map(|quotes| Some((before.rfind(quotes)?, quotes)));
+    let Some((start, quotes)) = quotes.max() else { return diagnostic };
+    diagnostic
+        .help(format!("a text that begins with {quotes} ends with {quotes}"))
+        .secondary(Span { document, range: start..start + quotes.len() }, "it begins here")
 }
 
 /// A key or a header that is there twice, with the first place.

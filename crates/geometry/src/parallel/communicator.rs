@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::layout::RowLayout;
-use crate::fem::c64;
 use crate::fem::csr::CsrStructure;
+use crate::fem::{CsrMatrix, c64};
 
 /// The ranks of a parallel program, as one of them sees them. All operations but `rank` and `size` are collective: every
 /// rank calls them, in the same order.
@@ -44,16 +44,19 @@ pub struct Rows {
     /// Who owns which equation.
     pub layout: Arc<RowLayout>,
     /// The coarse space of a second level, where there is one.
-    pub aggregates: Option<Arc<Aggregates>>,
+    pub coarse: Option<Arc<CoarseSpace>>,
 }
 
-/// A coarse space of piecewise constants on aggregates of own rows; no aggregate reaches beyond its rank.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Aggregates {
-    /// The aggregate of every own row, numbered from 0 on each rank.
-    pub of_row: Vec<u32>,
-    /// How many this rank has.
-    pub count: usize,
+/// A coarse space, as the rows of a rank see it.
+#[derive(Clone, Debug)]
+pub struct CoarseSpace {
+    /// The prolongation onto the own rows: its columns are the functions that this rank has for itself, and then those that reach over
+    /// all ranks, in the same order on each.
+    pub prolongation: CsrMatrix<f64>,
+    /// How many functions this rank has for itself.
+    pub own: usize,
+    /// What the diagonal entries of the others are multiplied by in the coarse matrix: they may depend on the own ones.
+    pub raise: f64,
 }
 
 /// A distributed matrix and what solves with it. All operations are collective.
@@ -108,7 +111,7 @@ pub enum Preconditioning {
     /// A factor of the whole matrix, distributed over the ranks.
     Direct,
     /// Additive Schwarz: one subdomain a rank, so many layers of the matrix graph larger than its own rows; with a second level
-    /// where there are [`Aggregates`].
+    /// where there is a [`CoarseSpace`].
     Schwarz {
         /// Layers of overlap.
         overlap: usize,

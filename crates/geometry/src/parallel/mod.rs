@@ -20,7 +20,7 @@ pub mod rank_group;
 pub mod threads;
 
 pub use communicator::{
-    Aggregates, Communicator, DistributedSolver, Krylov, Preconditioning, Rows, Solved, SolverOptions,
+    CoarseSpace, Communicator, DistributedSolver, Krylov, Preconditioning, Rows, Solved, SolverOptions,
     SubSolver,
 };
 pub use layout::RowLayout;

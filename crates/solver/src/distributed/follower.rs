@@ -40,12 +40,12 @@ impl Follower {
         let (space, dofs) = (&discretisation.space, &discretisation.unknowns.dofs);
         let owner = |carrier: CarrierId| ownership.partition.owner_of(space.vertices_of(carrier)[0]);
         let layout = Arc::new(RowLayout::new(dofs, ownership.group.size(), ownership.group.rank(), owner));
-        let aggregates = match settings.method_for(dofs.count()) {
+        let coarse = match settings.method_for(dofs.count()) {
             DistributedMethod::Direct => None,
-            DistributedMethod::Schwarz => discretisation.aggregates(&layout, || model.assemble(reference)),
+            DistributedMethod::Schwarz => discretisation.coarse_space_of(&layout, model.form(), reference),
         };
         let structure = Arc::clone(discretisation.pattern.structure());
-        let rows = Rows { structure, layout, aggregates: aggregates.map(Arc::new) };
+        let rows = Rows { structure, layout, coarse: coarse.map(Arc::new) };
         let tolerance = model.setup().linear_solver.tolerance;
         let limit = model.setup().linear_solver.max_iterations.unwrap_or(MAX_ITERATIONS);
         let options = settings.options("", dofs.count(), (tolerance, limit));

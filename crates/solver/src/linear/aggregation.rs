@@ -15,7 +15,6 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, DofMap, c64};
-use fluxmorph_geometry::parallel::Aggregates;
 
 use super::transfer::Transfer;
 use crate::unknowns::PSI;
@@ -38,6 +37,15 @@ const NONE: u32 = u32::MAX;
 
 /// Couplings of every aggregate with the others, by number, `(other, −Re)`.
 type Graph = Vec<Vec<(u32, f64)>>;
+
+/// Piecewise constants.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Aggregates {
+    /// The aggregate of every row.
+    pub(crate) of_row: Vec<u32>,
+    /// How many there are.
+    pub(crate) count: usize,
+}
 
 /// The prolongation from aggregates of all rows: one entry 1 a row.
 pub(crate) fn prolongation(aggregates: Aggregates) -> CsrMatrix<f64> {

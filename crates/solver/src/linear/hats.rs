@@ -13,10 +13,10 @@
 //! on which hats are linear (H. Freudenthal, Ann. of Math. 43 (1942) 580): four a node.
 
 use fluxmorph_geometry::fem::{CsrMatrix, DofMap};
-use fluxmorph_geometry::parallel::Aggregates;
 use fluxmorph_geometry::tet4::{Point, dot, norm};
 use fluxmorph_geometry::{CarrierId, eigen_decomposition};
 
+use super::aggregation::Aggregates;
 use crate::fixed_directions::Frame;
 
 /// The largest reluctivity over the smallest from which hats pay. On a plate of 51 000 and 210 000 unknowns factor, state and adjoint
@@ -32,6 +32,10 @@ const VERTICES_PER_ROOT_NODE: f64 = 8.0;
 
 /// Nodes for each vertex of the grid, at least: on small meshes, too, the coarse level is to be a small one.
 const NODES_PER_VERTEX: f64 = 15.0;
+
+/// What diagonal entries of hats are multiplied by: the hats of a component sum to one, as its aggregates do, and the coarse matrix
+/// would be singular but for rounding. From nothing to 1e-4 more the iterations do not change.
+pub(crate) const DIAGONAL_FACTOR: f64 = 1.0 + 1e-5;
 
 /// Share of all normals that is along other directions, up to which a surface lies along the axes.
 const ALONG: f64 = 1e-3;
@@ -55,14 +59,15 @@ pub(crate) struct Nodes<'a, F> {
     pub(crate) frame: F,
 }
 
-/// The prolongation from aggregates and, for every component of `A`, hats; shape `(dofs.count(), n_coarse)`, aggregates first.
+/// The prolongation from aggregates of some rows, ascending, and for every component of `A` from hats; shape `(rows, n_coarse)`,
+/// aggregates first.
 ///
 /// The hats of a component sum to one, as its aggregates do, unless one has too few unknowns and is left out: the columns depend on
-/// each other.
+/// each other. Which are left out does not depend on the rows.
 pub(crate) fn prolongation<'f>(
     dofs: &DofMap<4>,
     nodes: &Nodes<'_, impl Fn(CarrierId) -> Option<&'f Frame>>,
-    aggregates: &Aggregates,
+    (rows, aggregates): (&[u32], &Aggregates),
 ) -> CsrMatrix<f64> {
     let grid = Grid::new(nodes);
     let corners: Vec<[(usize, f64); 4]> = nodes.points.iter().map(|&point| grid.corners(point)).collect();
@@ -75,7 +80,8 @@ pub(crate) fn prolongation<'f>(
             .filter(|hat| hat.1 != 0.0)
     };
     let mut unknowns = vec![0; 3 * grid.vertex_count()];
-    dofs.places().flat_map(hats).for_each(|hat| unknowns[hat.0] += 1);
+    let places: Vec<_> = dofs.places().collect();
+    places.iter().flat_map(|&place| hats(place)).for_each(|hat| unknowns[hat.0] += 1);
     let mut count = aggregates.count as u32;
     let number = |unknowns: u32| {
         let column = if unknowns >= LEAST_UNKNOWNS { count } else { NONE };
@@ -83,13 +89,13 @@ pub(crate) fn prolongation<'f>(
         column
     };
     let columns: Vec<u32> = unknowns.into_iter().map(number).collect();
-    let row = |(place, &aggregate): ((CarrierId, usize), &u32)| {
-        let mut row = vec![(aggregate as usize, 1.0)];
-        row.extend(hats(place).map(|(hat, weight)| (columns[hat] as usize, weight)));
-        row.retain(|entry| entry.0 != NONE as usize);
-        row
+    let row = |(&row, &aggregate): (&u32, &u32)| {
+        let mut row_of = vec![(aggregate as usize, 1.0)];
+        row_of.extend(hats(places[row as usize]).map(|(hat, weight)| (columns[hat] as usize, weight)));
+        row_of.retain(|entry| entry.0 != NONE as usize);
+        row_of
     };
-    CsrMatrix::from_rows(count as usize, dofs.places().zip(&aggregates.of_row).map(row))
+    CsrMatrix::from_rows(count as usize, rows.iter().zip(&aggregates.of_row).map(row))
 }
 
 /// The axes along which the normals of a surface lie, of the area vectors [m²] of its triangles: the eigenvectors of the sum of `n nᵀ`.
@@ -218,7 +224,8 @@ mod tests {
         }
         let of_row: Vec<u32> = (0..dofs.count() as u32).map(|row| row / 5).collect();
         let aggregates = Aggregates { count: of_row[of_row.len() - 1] as usize + 1, of_row };
-        let p = prolongation(&dofs, &straight(&points), &aggregates);
+        let all: Vec<u32> = (0..dofs.count() as u32).collect();
+        let p = prolongation(&dofs, &straight(&points), (&all, &aggregates));
         for (row, &aggregate) in aggregates.of_row.iter().enumerate() {
             let own = p.structure.row(row);
             assert_eq!((p.structure.columns[own.start], p.values[own.start]), (aggregate, 1.0));
@@ -238,7 +245,9 @@ mod tests {
         let turned = Frame { axes: [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]] };
         let frame = |node: CarrierId| node.index().is_multiple_of(3).then_some(&turned);
         let aggregates = Aggregates { count: 1, of_row: vec![0; dofs.count()] };
-        let p = prolongation(&dofs, &Nodes { points: &points, axes: COORDINATES, frame }, &aggregates);
+        let all: Vec<u32> = (0..dofs.count() as u32).collect();
+        let nodes = Nodes { points: &points, axes: COORDINATES, frame };
+        let p = prolongation(&dofs, &nodes, (&all, &aggregates));
         // The coarse function with all hats of x is the field (1, 0, 0); none is left out in the middle of the lattice.
         let node = 5 + 12 * 5 + 120 * 3;
         let sum_at = |node: usize, c: usize| {

@@ -6,8 +6,9 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{CsrMatrix, Scalar, c64};
-use fluxmorph_geometry::parallel::Aggregates;
 use rayon::prelude::*;
+
+use super::aggregation::Aggregates;
 
 /// Rows per parallel task.
 const ROWS: usize = 1024;

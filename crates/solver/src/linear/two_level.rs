@@ -24,6 +24,7 @@ use rayon::prelude::*;
 use super::cost::{Costs, SINGLE_ENTRY, Sizes};
 use super::factor::{Precondition, Scaled, Unscaled};
 use super::gauss_seidel::{GaussSeidel, GaussSeidelAnalysis};
+use super::hats;
 use super::method::Method;
 use super::transfer::Transfer;
 use crate::elements::{ElementFamily, Order};
@@ -33,10 +34,6 @@ const ROWS: usize = 1024;
 
 /// What the diagonal is multiplied by before the incomplete factorisation. Between 1.0 and 1.05 the iterations hardly change.
 const DIAGONAL_FACTOR: f64 = 1.02;
-
-/// What diagonal entries of hats are multiplied by: the hats of a component sum to one, as its aggregates do, and the coarse matrix
-/// would be singular but for rounding. From nothing to 1e-4 more the iterations do not change.
-const HAT_DIAGONAL_FACTOR: f64 = 1.0 + 1e-5;
 
 /// Coupling over the diagonal from which two unknowns stay in one part of the incomplete factor.
 const STRONG: f64 = 0.25;
@@ -197,7 +194,7 @@ impl TwoLevel {
                 let (coarse, restricted) = {
                     let restricted = transfer.restricted_matrix(restricted, matrix);
                     let mut coarse = transfer.matrix_of_restricted(structure, &restricted);
-                    raised.iter().for_each(|&k| coarse.values[k as usize] *= HAT_DIAGONAL_FACTOR);
+                    raised.iter().for_each(|&k| coarse.values[k as usize] *= hats::DIAGONAL_FACTOR);
                     (coarse, single(&restricted))
                 };
                 let coarse = complete(coarse)?;
