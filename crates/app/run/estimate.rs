@@ -138,7 +138,7 @@ impl<'a> Estimator<'a> {
                 if self.effort == Effort::Affordable =>
             {
                 left_out(
-                    "it was given up after as much work as three evaluations take; accuracy.estimate = true goes on",
+                    "it was given up after as much work as six evaluations take; accuracy.estimate = true goes on",
                     observer,
                 )
             }

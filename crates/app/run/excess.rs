@@ -33,11 +33,13 @@ pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<Strin
     }
     let text = |(found, model): &(ExcessLoss, &FieldModel)| {
         let more = if found.share() > 0.0 { "more" } else { "less" };
-        let (why, cure) = if found.at_edges.abs() > found.of_curvature.abs() {
-            ("at its sharp edges", ", or mesh its edges round")
-        } else {
-            ("where it is round", "")
-        };
+        let reasons = [
+            (found.at_edges, ("at its sharp edges", ", or mesh its edges round")),
+            (found.of_curvature, ("where it is round", "")),
+            (found.of_variation, ("where the field along it changes within some skin depths", "")),
+        ];
+        let largest = reasons.into_iter().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
+        let (why, cure) = largest.map_or(("", ""), |(_, words)| words);
         format!(
             "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}: there a conductor is no half \
              space, and no error bar counts that. Where its loss matters, mesh it (model = \"volume\"){cure}",

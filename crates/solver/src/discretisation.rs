@@ -238,6 +238,7 @@ impl Discretisation {
         }
         let nodes = hats::Nodes {
             points: mesh.points(),
+            elements: mesh.topology().tets(),
             axes: hats::axes(weak_form.interfaces().map(|t| area_vector(t.map(|n| mesh.point(n))))),
             frame: |node| self.unknowns.frame(node),
         };

@@ -45,15 +45,15 @@ const REQUIRED: f64 = 1e-2;
 const MOST_ITERATIONS: [usize; 2] = [300, 3000];
 
 /// Evaluations that the iterations of an affordable estimate may cost.
-const MOST_EVALUATIONS: f64 = 3.0;
+const MOST_EVALUATIONS: f64 = 6.0;
 
-/// Counted work that is affordable whatever an evaluation costs [ns]: two seconds.
-const ALWAYS_AFFORDABLE: f64 = 2e9;
+/// Counted work that is affordable whatever an evaluation costs [ns]: ten seconds.
+const ALWAYS_AFFORDABLE: f64 = 1e10;
 
 /// How much an estimate may cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// Iterations of as much work as three evaluations, or two seconds.
+    /// Iterations of as much work as six evaluations, or ten seconds.
     Affordable,
     /// As much as it takes.
     Any,

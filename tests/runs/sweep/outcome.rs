@@ -143,6 +143,10 @@ fn one_that_fails_ends_no_other_and_the_worst_code_counts() {
     assert_eq!(home.runs("out"), ["design.surface=face"]);
     assert!(home.text("out/logs/design.surface=nowhere.log").contains("nowhere"));
     assert!(home.text("out/sweep.csv").contains("\nnowhere,failed,,"));
+    // It has no directory: the page links to what it said.
+    let page = home.text("out/sweep.html");
+    assert!(page.contains("href=\"logs/design.surface%3Dnowhere.log\""), "{page}");
+    assert!(!page.contains("href=\"design.surface%3Dnowhere/"), "{page}");
     assert!(home.text("out/sweep.html").contains("1 of 2 combinations have ended"));
     // All converge: the lower bound of the change is one that any step keeps.
     let converged = ["--set", "optimizer.ftol_rel=0.9,0.8", "--max-evaluations", "20"];

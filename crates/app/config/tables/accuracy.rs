@@ -34,7 +34,7 @@ table! {
         /// Whether the errors that come from the mesh are estimated, of the objective and of losses, forces, flux linkages,
         /// expansions and probes: by `solve`, and by `run` at the first and the best design, unless `output.verify_refinement` is 0. In
         /// one process. Default: an estimate is made for elements of first order, and given up where its iterations would cost more
-        /// than three evaluations and more than two seconds for each state (along a B–H curve: than each step of Newton's method
+        /// than six evaluations and more than ten seconds for each state (along a B–H curve: than each step of Newton's method
         /// may); to set up its system of second order takes its time beside that. `true`: it is made whatever it costs, and for
         /// elements of second order too, on eight times as many. With B–H curves there is one at 0 Hz alone.
         estimate: Option<bool> = FLAG;

@@ -69,9 +69,9 @@ pub struct Row {
     /// Evaluation and ratio, as they came.
     #[serde(skip)]
     pub(super) curve: Vec<[f64; 2]>,
-    /// Whether there is a page about the run.
+    /// What there is to read about the run, relative to the sweep, and what it is called.
     #[serde(skip)]
-    pub(super) is_reported: bool,
+    pub(super) file: Option<(String, &'static str)>,
 }
 
 impl Comparison {
@@ -210,8 +210,8 @@ impl Row {
         let run = match RunDirectory::open(layout.disk(), &sweep.run_directory(planned)) {
             Ok(run) => run,
             Err(OutputError::NoRun { .. }) => {
-                let status = has_failed(layout, planned).then_some(RunStatus::Failed);
-                return Ok(Self { status, ..blank });
+                let log = has_failed(layout, planned).then(|| (layout.log_name(planned), "log"));
+                return Ok(Self { status: log.as_ref().map(|_| RunStatus::Failed), file: log, ..blank });
             }
             Err(error) => return Err(error),
         };
@@ -235,7 +235,11 @@ impl Row {
             seconds: of_result(|result| result.timings_s.get("total").copied()),
             peak_memory_bytes: result.as_ref().map(|result| result.peak_memory_bytes),
             violated: result.as_ref().map_or(Vec::new(), RunResult::violated),
-            is_reported: is_file(layout, &run.report()),
+            file: Some(if is_file(layout, &run.report()) {
+                (format!("{}/report.html", blank.directory), "report")
+            } else {
+                (format!("{}/", blank.directory), "files")
+            }),
             curve,
             ..blank
         })

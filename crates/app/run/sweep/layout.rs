@@ -143,7 +143,12 @@ impl Layout {
 
     /// What the process of a combination says.
     pub fn log(&self, planned: &Planned) -> PathBuf {
-        self.path.join(LOGS).join(format!("{}.log", planned.combination.name))
+        self.path.join(self.log_name(planned))
+    }
+
+    /// The same, relative to the sweep.
+    pub fn log_name(&self, planned: &Planned) -> String {
+        format!("{LOGS}/{}.log", planned.combination.name)
     }
 
     /// Writes a whole file of the sweep, replacing an older one.

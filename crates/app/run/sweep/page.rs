@@ -175,12 +175,9 @@ fn front(comparison: &Comparison) -> Markup {
 
 fn cells(row: &Row) -> Vec<Markup> {
     let shown = |value: Option<f64>| value.map_or("–".to_owned(), |value| number(value, 4));
-    let link =
-        |target: &str, text: &str| html! { a href={ (address(&row.directory)) "/" (target) } { (text) } };
-    let run = match (row.is_reported, row.status) {
-        (true, _) => link("report.html", "report"),
-        (false, Some(_)) => link("", "files"),
-        (false, None) => html! { "–" },
+    let run = match &row.file {
+        Some((file, text)) => html! { a href=(address(file)) { (text) } },
+        None => html! { "–" },
     };
     let memory = row.peak_memory_bytes.filter(|bytes| *bytes > 0);
     let texts = [

@@ -1,4 +1,5 @@
-//! What impedance surfaces leave out where a conductor is no half space: at its sharp edges, and where it is round.
+//! What impedance surfaces leave out where a conductor is no half space: at its sharp edges, and where it is round; and where the
+//! field along it changes within a few skin depths.
 //!
 //! **Sharp edges.** Along one the field grows, with the distance `s` from it as `s^(p − 1)`, `p = π/θ` by the angle `θ` outside, until
 //! it is a skin depth away; what goes on there is a matter of the angle, of the permeability and of the skin depth alone. Of
@@ -16,6 +17,11 @@
 //! times `1 + δ(κ₂ − κ₁)/2` (S. M. Rytov, J. Exp. Theor. Phys. 10 (1940) 180; a wire of radius `a` has `I₀/I₁`, a billet along the field
 //! `I₁/I₀`, which begin with `1 ± δ/2a`). Of facets all curvature is in the edges between them: the angle between both times the
 //! length, across the edge.
+//!
+//! **Fields that change.** In a half space a field of wave number `k` along the surface goes down as `exp(−√(γ² + k²) z)` and not as
+//! `exp(−γ z)`, `γ = (1 + j)/δ`. For a given field at the surface, electric or magnetic, that takes `(k δ)²/4` off the loss, to
+//! `(k δ)⁴`. Over all waves that is `δ²/4 ∫ |∇E|² / ∫ |E|²`, of the field along the surface with its mean at the nodes, but for the
+//! elements beside edges.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -78,12 +84,14 @@ pub struct ExcessLoss {
     pub at_edges: f64,
     /// What it has more, or less, where it is round, about [W].
     pub of_curvature: f64,
+    /// What it has less where the field along it changes within some skin depths, about [W]; negative.
+    pub of_variation: f64,
 }
 
 impl ExcessLoss {
     /// What the conductor has more, about [W].
     pub fn more(&self) -> f64 {
-        self.at_edges + self.of_curvature
+        self.at_edges + self.of_curvature + self.of_variation
     }
 
     /// The same over the loss of its surface.
@@ -134,9 +142,14 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
             let share = excess_share(strip.angle, strip.width / skin_depth, material.relative_permeability);
             Some(own.loss * own.share_along(strip.direction) * share)
         };
+        let of_surface = triangles.iter().map(|own| own.loss).sum();
+        let variation =
+            0.25 * skin_depth * skin_depth * bends.variation(mesh, &conductor.surface, &triangles);
         Some(ExcessLoss {
             region: conductor.name.clone(),
-            of_surface: triangles.iter().map(|own| own.loss).sum(),
+            of_surface,
+            // Waves of no more than a skin depth have hardly any loss.
+            of_variation: -of_surface * variation.min(1.0),
             at_edges: conductor.surface.iter().zip(&triangles).filter_map(at_edge).sum(),
             of_curvature: 0.5 * skin_depth * bends.round.iter().map(|own| own.weigh(&triangles)).sum::<f64>(),
         })
@@ -145,6 +158,13 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
 }
 
 impl SurfaceTriangle {
+    /// What a field has along the triangle.
+    fn along(&self, [x, y, z]: Complex3) -> Complex3 {
+        let normal = unit(self.area);
+        let across = x * normal[0] + y * normal[1] + z * normal[2];
+        [x - across * normal[0], y - across * normal[1], z - across * normal[2]]
+    }
+
     /// Share of the square of the current in the direction of a unit vector along the surface.
     fn share_along(&self, direction: Point) -> f64 {
         let part = |of: Point| (0..3).map(|d| self.field[d] * of[d]).sum::<c64>().norm_sqr();
@@ -206,6 +226,8 @@ impl RoundEdge {
 struct Bends {
     /// The sharp edges by the nodes on them.
     sharp: BTreeMap<NodeId, Vec<SharpEdge>>,
+    /// The nodes on these and on edges that stand into the conductor.
+    creased: HashSet<NodeId>,
     round: Vec<RoundEdge>,
 }
 
@@ -256,12 +278,48 @@ impl Bends {
         let along = sub(b, a);
         if turn.abs() < CREASE.to_radians() {
             self.round.push(RoundEdge { sides, direction: unit(along), turn: share * turn * norm(along) });
-        } else if turn > 0.0 {
+            return;
+        }
+        self.creased.extend(ends);
+        if turn > 0.0 {
             for node in ends {
                 let edge = SharpEdge { ends, angle: 180.0 - turn.to_degrees() };
                 self.sharp.entry(node).or_default().push(edge);
             }
         }
+    }
+
+    /// `∫ |∇E|² / ∫ |E|²` of the field along the surface [1/m²], without the triangles at edges.
+    fn variation(&self, mesh: &Mesh, surface: &[[NodeId; 3]], triangles: &[SurfaceTriangle]) -> f64 {
+        let mut means: HashMap<NodeId, (Complex3, f64)> = HashMap::new();
+        for (nodes, own) in surface.iter().zip(triangles) {
+            let (field, area) = (own.along(own.field), norm(own.area));
+            for node in nodes {
+                let (sum, weight) = means.entry(*node).or_default();
+                sum.iter_mut().zip(field).for_each(|(sum, c)| *sum += area * c);
+                *weight += area;
+            }
+        }
+        let [mut of_gradient, mut of_field] = [0.0; 2];
+        for (nodes, own) in surface.iter().zip(triangles) {
+            of_field += norm(own.area) * own.along(own.field).iter().map(|c| c.norm_sqr()).sum::<f64>();
+            if nodes.iter().any(|node| self.creased.contains(node)) {
+                continue;
+            }
+            let [a, b, c] = nodes.map(|node| mesh.point(node));
+            // Opposite the vertices, whose functions have them as gradients, turned by a right angle and over twice the area.
+            let opposite = [sub(c, b), sub(a, c), sub(b, a)];
+            let values = nodes.map(|node| {
+                let (sum, weight) = means[&node];
+                // On a round surface a field that turns with it does not change.
+                own.along(sum.map(|c| c / weight))
+            });
+            for d in 0..3 {
+                let turned = [0, 1, 2].map(|i| (0..3).map(|k| values[k][d] * opposite[k][i]).sum::<c64>());
+                of_gradient += turned.iter().map(|c| c.norm_sqr()).sum::<f64>() / (4.0 * norm(own.area));
+            }
+        }
+        if of_field > 0.0 { of_gradient / of_field } else { 0.0 }
     }
 
     /// Where a triangle lies beside the nearest sharp edge that it begins at; `None` where it touches none.

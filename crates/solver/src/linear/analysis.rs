@@ -213,7 +213,9 @@ impl SystemAnalysis {
 
     /// Whether the preconditioner of a method stays within the settings' bytes; not where it cannot be made at all.
     pub(super) fn fits(&self, method: Method) -> bool {
-        self.preconditioner_bytes(method).is_ok_and(|bytes| bytes <= self.settings.factor_bytes)
+        // Without any bytes for one a factor is not even analysed, which may take longer than the iterations.
+        self.settings.factor_bytes > 0
+            && self.preconditioner_bytes(method).is_ok_and(|bytes| bytes <= self.settings.factor_bytes)
     }
 
     /// The next more robust method that fits.
