@@ -1,4 +1,4 @@
-//! The measurement of docs/scale.md on the smallest of its meshes, which has hats in its coarse space.
+//! The measurement of docs/scale.md on the smallest mesh of `tools/scale.py`, which has hats in its coarse space.
 
 use std::process::Command;
 

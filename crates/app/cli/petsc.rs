@@ -127,7 +127,14 @@ impl PetscSolver {
             let CsrMatrix { structure, values } = &coarse.prolongation;
             let CsrStructure { row_starts, columns, column_count } = &**structure;
             let [own, shared] = [coarse.own, column_count - coarse.own];
-            Coarse { row_starts, columns, weights: values, own, shared, raise: coarse.raise }
+            Coarse {
+                row_starts,
+                columns,
+                weights: values,
+                own,
+                shared,
+                diagonal_factor: coarse.diagonal_factor,
+            }
         });
         let shape = Shape { count: layout.count(), inside, outside, coarse };
         let settings = Settings {

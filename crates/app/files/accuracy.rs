@@ -21,6 +21,10 @@ pub const SAFETY: f64 = 2.0;
 /// Share of a loss, or of an objective, that impedance surfaces may leave out without a word.
 pub const LEAST_LEFT_OUT: f64 = 0.01;
 
+/// Where they leave it out.
+pub const WHERE_LEFT_OUT: &str =
+    "at sharp edges, where they are round and where the field along them changes";
+
 /// The share of the relative error of a value that need not cancel in the ratio of two designs, however alike their estimates
 /// are: an estimate has an error itself. `shield_two_loads.toml` at a quarter of its refinement has estimates of 1.2 of both
 /// values, whose difference is 8e-5 of the ratio; on meshes with 0.9 and 1.4 of its refinement the ratio differs by 1.2e-2.
@@ -53,7 +57,7 @@ pub struct Accuracy {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub facets: Option<CurvedFacets>,
     /// What the objective at the initial and at the best design has more, about, by the losses that impedance surfaces leave out at
-    /// sharp edges and where they are round [its unit]; of an analysis both are the same. `None` where it has no loss of one.
+    /// sharp edges, where they are round and where the field along them changes [its unit]; of an analysis both are the same. `None` where it has no loss of one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub excess: Option<[f64; 2]>,
     /// What a wall that is near may cut off, in words; `None` where none is.

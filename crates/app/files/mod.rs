@@ -24,7 +24,7 @@ mod synced;
 use std::path::{Path, PathBuf};
 
 pub use accuracy::{
-    Accuracy, CrossCheck, CurvedFacets, LEAST_LEFT_OUT, Level, SAFETY, Verdict, relative_bar,
+    Accuracy, CrossCheck, CurvedFacets, LEAST_LEFT_OUT, Level, SAFETY, Verdict, WHERE_LEFT_OUT, relative_bar,
 };
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFile, DesignFileError, read_design};

@@ -17,7 +17,7 @@ use fluxmorph_solver::{FieldModel, FieldSolution};
 use super::Session;
 use super::reported::under;
 use crate::config::ObjectiveKind;
-use crate::files::LEAST_LEFT_OUT;
+use crate::files::{LEAST_LEFT_OUT, WHERE_LEFT_OUT};
 use crate::show::Observer;
 
 /// What impedance surfaces leave out of losses in words, of each conductor where that is the largest share.
@@ -33,16 +33,25 @@ pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<Strin
     }
     let text = |(found, model): &(ExcessLoss, &FieldModel)| {
         let more = if found.share() > 0.0 { "more" } else { "less" };
-        let reasons = [
-            (found.at_edges, ("at its sharp edges", ", or mesh its edges round")),
-            (found.of_curvature, ("where it is round", "")),
-            (found.of_variation, ("where the field along it changes within some skin depths", "")),
+        let mut reasons = [
+            (
+                found.at_edges,
+                "at its sharp edges: there a conductor is no half space",
+                ", or mesh its edges round",
+            ),
+            (found.of_curvature, "where it is round: there a conductor is no half space", ""),
+            (
+                found.of_variation,
+                "where the field along it changes within some skin depths: there it goes down faster",
+                "",
+            ),
         ];
-        let largest = reasons.into_iter().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()));
-        let (why, cure) = largest.map_or(("", ""), |(_, words)| words);
+        // The one that has most of that sign.
+        reasons.sort_by(|a, b| (found.more() * b.0).total_cmp(&(found.more() * a.0)));
+        let [(_, why, cure), ..] = reasons;
         format!(
-            "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}: there a conductor is no half \
-             space, and no error bar counts that. Where its loss matters, mesh it (model = \"volume\"){cure}",
+            "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}, \
+             and no error bar counts that. Where its loss matters, mesh it (model = \"volume\"){cure}",
             found.region,
             100.0 * found.share().abs(),
             Readable(model.setup().frequency),
@@ -149,8 +158,8 @@ impl LeftOut {
             let beyond = bound.excess(value + more - of_bound(k)?);
             (bound.is_satisfied(value) && beyond > LEAST_LEFT_OUT).then(|| {
                 format!(
-                    "the constraint `{}` keeps its bound by the loss of impedance surfaces; with what these leave out at sharp \
-                     edges and where they are round it is about {:.1} % beyond",
+                    "the constraint `{}` keeps its bound by the loss of impedance surfaces; with what these leave out {WHERE_LEFT_OUT} \
+                     it is about {:.1} % beyond",
                     problem.constraints()[k].name,
                     100.0 * beyond
                 )
@@ -189,7 +198,7 @@ pub(super) fn described([at_initial, at_best]: [f64; 2], [initial, best]: [f64; 
     let [first, last] = [at_initial / initial.abs(), at_best / best.abs()];
     (first.abs().max(last.abs()) > LEAST_LEFT_OUT).then(|| {
         format!(
-            "what impedance surfaces leave out, at sharp edges and where they are round, changes the objective by about {:+.2} % at \
+            "what impedance surfaces leave out, {WHERE_LEFT_OUT}, changes the objective by about {:+.2} % at \
              the initial and {:+.2} % at the best design, of what it is there, and F/F0 from {:.5} to {:.5}, which no \
              error bar and no mesh counts; where that matters, mesh these regions (model = \"volume\")",
             100.0 * first,

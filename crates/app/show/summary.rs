@@ -10,7 +10,7 @@ use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
     Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT, MultipoleResult,
     ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateErrors,
-    StateResult, Verdict, Verification, VerificationMesh,
+    StateResult, Verdict, Verification, VerificationMesh, WHERE_LEFT_OUT,
 };
 use crate::printable::printable;
 
@@ -322,8 +322,7 @@ fn analysis(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         if let Some([more, _]) =
             left_out.filter(|[more, _]| more.abs() > LEAST_LEFT_OUT * objective.best.abs())
         {
-            let what =
-                "by impedance surfaces at sharp edges and where they are round; no error bar counts it";
+            let what = format!("by impedance surfaces {WHERE_LEFT_OUT}; no error bar counts it");
             rows.push(("left out", format!("{more:+.1e}{} {what}", named.unit)));
         }
     }

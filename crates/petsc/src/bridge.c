@@ -169,12 +169,12 @@ int fm_option_used(const char *name) {
 /* ---- solvers ---- */
 
 /* The prolongation from a coarse space onto own rows: entries of row i are at starts[i] .. starts[i + 1]. Columns below `own` are
- * this rank's, the `shared` ones after them those of all ranks; what the diagonal of these is multiplied by is `raise`. */
+ * this rank's, the `shared` ones after them those of all ranks; `diagonal_factor` is what the diagonal of these is multiplied by. */
 typedef struct {
     const uint32_t *starts, *columns;
     const double *weights;
     int64_t own, shared;
-    double raise;
+    double diagonal_factor;
 } fm_coarse_space;
 
 typedef struct {
@@ -191,7 +191,7 @@ typedef struct {
     /* Of the coarse columns of this rank, how many are its own, how many there are, and what the diagonal of the others is
      * multiplied by. */
     PetscInt coarse_own, coarse_here;
-    PetscReal raise;
+    PetscReal diagonal_factor;
     PetscInt own, first;
     PetscReal tolerance;
     int most;
@@ -265,11 +265,9 @@ static PetscInt first_shared(PetscInt shared, int size, int rank) {
 
 /* Inserts the rows of the prolongation; no rank waits for another. Every rank has its own columns first and its part of the
  * shared ones behind them. */
-static PetscErrorCode insert_prolongation(fm_solver *solver, const fm_coarse_space *space, int size) {
+static PetscErrorCode insert_prolongation(fm_solver *solver, const fm_coarse_space *space, int rank, int size) {
     const PetscInt *ranges = NULL;
     TRY(MatGetOwnershipRangesColumn(solver->prolongation, &ranges));
-    int rank = 0;
-    MPI_Comm_rank(PETSC_COMM_WORLD, &rank);
     PetscInt own = (PetscInt)space->own, shared = (PetscInt)space->shared;
     for (PetscInt row = 0; row < solver->own; row++) {
         int holder = 0;
@@ -299,16 +297,19 @@ static int add_coarse_level(fm_solver *solver, const char *prefix, const fm_coar
     PetscInt shared = (PetscInt)space->shared;
     solver->coarse_own = (PetscInt)space->own;
     solver->coarse_here = solver->coarse_own + first_shared(shared, size, rank + 1) - first_shared(shared, size, rank);
-    solver->raise = space->raise;
-    PetscInt *entries = NULL;
-    TRY(PetscMalloc1(solver->own + 1, &entries));
+    solver->diagonal_factor = space->diagonal_factor;
+    /* An entry of a shared column may be in one held here or elsewhere; neither block has more entries a row than columns. */
+    PetscInt *inside = NULL, *outside = NULL, elsewhere = shared - (solver->coarse_here - solver->coarse_own);
+    TRY(PetscMalloc2(solver->own + 1, &inside, solver->own + 1, &outside));
     for (PetscInt row = 0; row < solver->own; row++) {
-        entries[row] = (PetscInt)(space->starts[row + 1] - space->starts[row]);
+        PetscInt length = (PetscInt)(space->starts[row + 1] - space->starts[row]);
+        inside[row] = PetscMin(length, solver->coarse_here);
+        outside[row] = PetscMin(length, elsewhere);
     }
-    TRY(MatCreateAIJ(PETSC_COMM_WORLD, solver->own, solver->coarse_here, PETSC_DETERMINE, PETSC_DETERMINE, 0, entries, 0,
-                     shared == 0 ? NULL : entries, &solver->prolongation));
-    TRY(PetscFree(entries));
-    if (agree(insert_prolongation(solver, space, size))) {
+    TRY(MatCreateAIJ(PETSC_COMM_WORLD, solver->own, solver->coarse_here, PETSC_DETERMINE, PETSC_DETERMINE, 0, inside, 0, outside,
+                     &solver->prolongation));
+    TRY(PetscFree2(inside, outside));
+    if (agree(insert_prolongation(solver, space, rank, size))) {
         return 1;
     }
     TRY(MatAssemblyBegin(solver->prolongation, MAT_FINAL_ASSEMBLY));
@@ -432,14 +433,14 @@ static PetscErrorCode check_preconditioner(PC pc, const char *what, failure *fou
 
 /* Multiplies the diagonal entries of the shared columns. */
 static PetscErrorCode raise_diagonal(fm_solver *solver) {
-    if (solver->raise == 1.0) {
+    if (solver->diagonal_factor == 1.0) {
         return 0;
     }
     PetscScalar *entries = NULL;
     TRY(MatGetDiagonal(solver->coarse_matrix, solver->correction));
     TRY(VecGetArray(solver->correction, &entries));
     for (PetscInt column = solver->coarse_own; column < solver->coarse_here; column++) {
-        entries[column] *= solver->raise;
+        entries[column] *= solver->diagonal_factor;
     }
     TRY(VecRestoreArray(solver->correction, &entries));
     TRY(MatDiagonalSet(solver->coarse_matrix, solver->correction, INSERT_VALUES));

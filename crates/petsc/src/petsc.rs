@@ -26,7 +26,7 @@ struct RawCoarse {
     weights: *const c_double,
     own: i64,
     shared: i64,
-    raise: c_double,
+    diagonal_factor: c_double,
 }
 
 unsafe extern "C" {
@@ -222,7 +222,8 @@ impl Petsc {
     /// What PETSc says.
     ///
     /// # Panics
-    /// Unless `inside`, `outside` and the coarse space have the same rows, and this one no other columns than its own.
+    /// Unless `inside`, `outside` and the coarse space have the same rows, and all columns of this one are below
+    /// `own + shared`.
     pub fn solver(&self, shape: &Shape<'_>, prefix: &str, settings: &Settings) -> Result<Solver, String> {
         Solver::new(Arc::clone(&self.session), shape, prefix, settings)
     }
@@ -267,7 +268,7 @@ pub struct Coarse<'a> {
     /// Columns that all ranks have.
     pub shared: usize,
     /// What the diagonal entries of these are multiplied by in the coarse matrix.
-    pub raise: f64,
+    pub diagonal_factor: f64,
 }
 
 impl Coarse<'_> {
@@ -290,7 +291,7 @@ impl Coarse<'_> {
             weights: self.weights.as_ptr(),
             own: self.own as i64,
             shared: self.shared as i64,
-            raise: self.raise,
+            diagonal_factor: self.diagonal_factor,
         }
     }
 }

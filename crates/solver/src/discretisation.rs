@@ -234,7 +234,11 @@ impl Discretisation {
         if dofs.count() < hats::UNKNOWNS || weak_form.reluctivity_contrast() < hats::RELUCTIVITY_CONTRAST {
             let aggregates = aggregates(aggregation::PASSES);
             let own = aggregates.count;
-            return CoarseSpace { prolongation: aggregation::prolongation(aggregates), own, raise: 1.0 };
+            return CoarseSpace {
+                prolongation: aggregation::prolongation(aggregates),
+                own,
+                diagonal_factor: 1.0,
+            };
         }
         let nodes = hats::Nodes {
             points: mesh.points(),
@@ -244,7 +248,7 @@ impl Discretisation {
         };
         let aggregates = aggregates(aggregation::PASSES_BESIDE_HATS);
         let prolongation = hats::prolongation(dofs, &nodes, (rows, &aggregates));
-        CoarseSpace { prolongation, own: aggregates.count, raise: hats::DIAGONAL_FACTOR }
+        CoarseSpace { prolongation, own: aggregates.count, diagonal_factor: hats::DIAGONAL_FACTOR }
     }
 
     /// The coarse space of the rows of this rank, by the couplings of the matrix that it assembles; linear nodal elements alone have

@@ -34,7 +34,9 @@ pub(super) fn diagnostics(document: usize, text: &str, errors: &[toml::de::Error
             Diagnostic::new("", Span { document, range: range.clone() }, format!("not valid TOML: {said}"));
         found.push(match advice(text, &range, line) {
             _ if is_duplicate => duplicate(diagnostic, text, range),
-            _ if message.contains("multi-line") => unclosed_lines(diagnostic, text, range),
+            _ if message.starts_with("invalid multi-line") && range.start >= text.trim_end().len() => {
+                unclosed_lines(diagnostic, text, message)
+            }
             Some(advice) => diagnostic.help(advice),
             None if follows => diagnostic.help("a list or a table above this line is not closed"),
             None => diagnostic,
@@ -58,11 +60,10 @@ fn advice(text: &str, range: &Range<usize>, line: &str) -> Option<String> {
 }
 
 /// A text of several lines that is not closed, with the place where it begins.
-fn unclosed_lines(diagnostic: Diagnostic, text: &str, range: Range<usize>) -> Diagnostic {
+fn unclosed_lines(diagnostic: Diagnostic, text: &str, message: &str) -> Diagnostic {
     let document = diagnostic.span.document;
-    let before = text.get(..range.start).unwrap_or_default();
-    let quotes = ["\"\"\"", "'''"].into_iter().filter_map(|quotes| Some((before.rfind(quotes)?, quotes)));
-    let Some((start, quotes)) = quotes.max() else { return diagnostic };
+    let quotes = if message.contains("literal") { "'''" } else { "\"\"\"" };
+    let Some(start) = text.rfind(quotes) else { return diagnostic };
     diagnostic
         .help(format!("a text that begins with {quotes} ends with {quotes}"))
         .secondary(Span { document, range: start..start + quotes.len() }, "it begins here")

@@ -56,7 +56,7 @@ pub struct CoarseSpace {
     /// How many functions this rank has for itself.
     pub own: usize,
     /// What the diagonal entries of the others are multiplied by in the coarse matrix: they may depend on the own ones.
-    pub raise: f64,
+    pub diagonal_factor: f64,
 }
 
 /// A distributed matrix and what solves with it. All operations are collective.

@@ -20,8 +20,8 @@
 //!
 //! **Fields that change.** In a half space a field of wave number `k` along the surface goes down as `exp(−√(γ² + k²) z)` and not as
 //! `exp(−γ z)`, `γ = (1 + j)/δ`. For a given field at the surface, electric or magnetic, that takes `(k δ)²/4` off the loss, to
-//! `(k δ)⁴`. Over all waves that is `δ²/4 ∫ |∇E|² / ∫ |E|²`, of the field along the surface with its mean at the nodes, but for the
-//! elements beside edges.
+//! `(k δ)⁴`. Over all waves that is `δ²/4 ∫ |∇E|² / ∫ |E|²`, of the field along the surface with its mean at the nodes, but for what
+//! is beside edges.
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -67,6 +67,9 @@ const EXCESS_OF_IRON: [(f64, [f64; 8]); 7] = [
     (300.0, [0.250, 0.126, 0.061, 0.031, 0.016, 0.008, 0.004, 0.002]),
 ];
 
+/// Skin depths from an edge, at least, beyond which the field changes as along a half space.
+const NEAR_EDGE: f64 = 4.0;
+
 /// Angle [°] between a surface and its image behind a wall from which on the surface ends there along the wall, and is no wedge.
 const ALONG_WALL: f64 = 150.0;
 
@@ -104,7 +107,7 @@ impl ExcessLoss {
 struct SurfaceTriangle {
     /// [W]
     loss: f64,
-    /// In its middle, `E/(−jω)` [T m].
+    /// In its middle, `E/(−jω)` along the surface [T m].
     field: Complex3,
     /// Its area vector [m²], into the conductor.
     area: Point,
@@ -132,7 +135,7 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
             let e = *inside.get(&key)?;
             let field = solution.at(model, mesh, e, &mesh.topology().tet(e).map(of_face)).electric_potential;
             let area = area_vector(triangle.map(|node| mesh.point(node)));
-            Some(SurfaceTriangle { loss: *losses.get(&key)?, field, area })
+            Some(SurfaceTriangle { loss: *losses.get(&key)?, field: along(area, field), area })
         };
         let triangles: Vec<SurfaceTriangle> =
             conductor.surface.iter().map(of_triangle).collect::<Option<_>>()?;
@@ -143,8 +146,10 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
             Some(own.loss * own.share_along(strip.direction) * share)
         };
         let of_surface = triangles.iter().map(|own| own.loss).sum();
-        let variation =
-            0.25 * skin_depth * skin_depth * bends.variation(mesh, &conductor.surface, &triangles);
+        let variation = 0.25
+            * skin_depth
+            * skin_depth
+            * bends.variation(mesh, skin_depth, (&conductor.surface, &triangles));
         Some(ExcessLoss {
             region: conductor.name.clone(),
             of_surface,
@@ -158,20 +163,24 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
 }
 
 impl SurfaceTriangle {
-    /// What a field has along the triangle.
-    fn along(&self, [x, y, z]: Complex3) -> Complex3 {
-        let normal = unit(self.area);
-        let across = x * normal[0] + y * normal[1] + z * normal[2];
-        [x - across * normal[0], y - across * normal[1], z - across * normal[2]]
-    }
-
     /// Share of the square of the current in the direction of a unit vector along the surface.
     fn share_along(&self, direction: Point) -> f64 {
-        let part = |of: Point| (0..3).map(|d| self.field[d] * of[d]).sum::<c64>().norm_sqr();
-        let across = part(self.area) / dot(self.area, self.area);
-        let along: f64 = self.field.iter().map(|c| c.norm_sqr()).sum::<f64>() - across;
-        if along > 0.0 { (part(direction) / along).min(1.0) } else { 0.0 }
+        let part: c64 = (0..3).map(|d| self.field[d] * direction[d]).sum();
+        let all = square(&self.field);
+        if all > 0.0 { (part.norm_sqr() / all).min(1.0) } else { 0.0 }
     }
+}
+
+/// What a field has along a triangle with this area vector.
+fn along(area: Point, [x, y, z]: Complex3) -> Complex3 {
+    let normal = unit(area);
+    let across = x * normal[0] + y * normal[1] + z * normal[2];
+    [x - across * normal[0], y - across * normal[1], z - across * normal[2]]
+}
+
+/// `|E|²`
+fn square(field: &Complex3) -> f64 {
+    field.iter().map(|c| c.norm_sqr()).sum()
 }
 
 /// By how much a conductor has more loss than its surface within a strip of so many skin depths beside an edge, over the loss there.
@@ -289,34 +298,48 @@ impl Bends {
         }
     }
 
-    /// `∫ |∇E|² / ∫ |E|²` of the field along the surface [1/m²], without the triangles at edges.
-    fn variation(&self, mesh: &Mesh, surface: &[[NodeId; 3]], triangles: &[SurfaceTriangle]) -> f64 {
+    /// `∫ |∇E|² / ∫ |E|²` of the field along the surface [1/m²], without the triangles at edges and within a few skin depths of their
+    /// nodes: what goes on there is in [`EXCESS`].
+    fn variation(
+        &self,
+        mesh: &Mesh,
+        skin_depth: f64,
+        (surface, triangles): (&[[NodeId; 3]], &[SurfaceTriangle]),
+    ) -> f64 {
+        let cell = |x: Point| x.map(|c| (c / (NEAR_EDGE * skin_depth)).floor() as i64);
+        let around = |node: &NodeId| {
+            let own = cell(mesh.point(*node));
+            (0..27).map(move |k| [own[0] + k % 3 - 1, own[1] + k / 3 % 3 - 1, own[2] + k / 9 - 1])
+        };
+        let near: HashSet<[i64; 3]> = self.creased.iter().flat_map(around).collect();
         let mut means: HashMap<NodeId, (Complex3, f64)> = HashMap::new();
         for (nodes, own) in surface.iter().zip(triangles) {
-            let (field, area) = (own.along(own.field), norm(own.area));
+            let area = norm(own.area);
             for node in nodes {
                 let (sum, weight) = means.entry(*node).or_default();
-                sum.iter_mut().zip(field).for_each(|(sum, c)| *sum += area * c);
+                sum.iter_mut().zip(own.field).for_each(|(sum, c)| *sum += area * c);
                 *weight += area;
             }
         }
         let [mut of_gradient, mut of_field] = [0.0; 2];
         for (nodes, own) in surface.iter().zip(triangles) {
-            of_field += norm(own.area) * own.along(own.field).iter().map(|c| c.norm_sqr()).sum::<f64>();
-            if nodes.iter().any(|node| self.creased.contains(node)) {
+            of_field += norm(own.area) * square(&own.field);
+            let [a, b, c] = nodes.map(|node| mesh.point(node));
+            if nodes.iter().any(|node| self.creased.contains(node))
+                || near.contains(&cell(centroid([a, b, c])))
+            {
                 continue;
             }
-            let [a, b, c] = nodes.map(|node| mesh.point(node));
             // Opposite the vertices, whose functions have them as gradients, turned by a right angle and over twice the area.
             let opposite = [sub(c, b), sub(a, c), sub(b, a)];
             let values = nodes.map(|node| {
                 let (sum, weight) = means[&node];
                 // On a round surface a field that turns with it does not change.
-                own.along(sum.map(|c| c / weight))
+                along(own.area, sum.map(|c| c / weight))
             });
             for d in 0..3 {
                 let turned = [0, 1, 2].map(|i| (0..3).map(|k| values[k][d] * opposite[k][i]).sum::<c64>());
-                of_gradient += turned.iter().map(|c| c.norm_sqr()).sum::<f64>() / (4.0 * norm(own.area));
+                of_gradient += square(&turned) / (4.0 * norm(own.area));
             }
         }
         if of_field > 0.0 { of_gradient / of_field } else { 0.0 }

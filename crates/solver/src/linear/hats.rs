@@ -92,10 +92,10 @@ pub(crate) fn prolongation<'f>(
     };
     let columns: Vec<u32> = unknowns.into_iter().map(number).collect();
     let row = |(&row, &aggregate): (&u32, &u32)| {
-        let mut row_of = vec![(aggregate as usize, 1.0)];
-        row_of.extend(hats(places[row as usize]).map(|(hat, weight)| (columns[hat] as usize, weight)));
-        row_of.retain(|entry| entry.0 != NONE as usize);
-        row_of
+        let mut entries = vec![(aggregate as usize, 1.0)];
+        entries.extend(hats(places[row as usize]).map(|(hat, weight)| (columns[hat] as usize, weight)));
+        entries.retain(|entry| entry.0 != NONE as usize);
+        entries
     };
     CsrMatrix::from_rows(count as usize, rows.iter().zip(&aggregates.of_row).map(row))
 }
@@ -136,10 +136,10 @@ impl Grid {
         });
         let distinct = sorted.each_ref().map(|values| merged(values).len());
         let weights = layers(nodes, &sorted).map(f64::sqrt);
-        // The axis that its coordinates or its layers leave the fewest lines is the first: its share is left to the others.
+        // The axis that its coordinates or its layers leave the fewest lines for its weight is the first: the others have its share.
         let mut order = [0, 1, 2];
         order.sort_by(|&a, &b| {
-            let room = |axis: usize| distinct[axis] as f64 / weights[axis];
+            let room = |axis: usize| (distinct[axis] as f64).min(weights[axis].powi(2) + 1.0) / weights[axis];
             room(a).total_cmp(&room(b))
         });
         let mut lines = [const { Vec::new() }; 3];
