@@ -57,7 +57,8 @@ pub struct Accuracy {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub facets: Option<CurvedFacets>,
     /// What the objective at the initial and at the best design has more, about, by the losses that impedance surfaces leave out at
-    /// sharp edges, where they are round and where the field along them changes [its unit]; of an analysis both are the same. `None` where it has no loss of one.
+    /// sharp edges, where they are round and where the field along them changes [its unit]; of an analysis both are the same. `None`
+    /// where it has no loss of one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub excess: Option<[f64; 2]>,
     /// What a wall that is near may cut off, in words; `None` where none is.

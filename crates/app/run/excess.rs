@@ -158,8 +158,8 @@ impl LeftOut {
             let beyond = bound.excess(value + more - of_bound(k)?);
             (bound.is_satisfied(value) && beyond > LEAST_LEFT_OUT).then(|| {
                 format!(
-                    "the constraint `{}` keeps its bound by the loss of impedance surfaces; with what these leave out {WHERE_LEFT_OUT} \
-                     it is about {:.1} % beyond",
+                    "the constraint `{}` keeps its bound by the loss of impedance surfaces; with what these leave out \
+                     {WHERE_LEFT_OUT} it is about {:.1} % beyond",
                     problem.constraints()[k].name,
                     100.0 * beyond
                 )
