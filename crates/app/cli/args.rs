@@ -135,11 +135,11 @@ pub struct CommonArgs {
 #[derive(Debug, Args)]
 pub struct LimitArgs {
     /// Most evaluations of the objective; with `resume`, earlier ones count too
-    #[arg(long, value_name = "N", value_parser = evaluations)]
+    #[arg(long, value_name = "N", value_parser = evaluations, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
 
     /// Longest time from now, such as "10 min" or 90 (seconds)
-    #[arg(long, value_name = "DURATION", value_parser = duration)]
+    #[arg(long, value_name = "DURATION", value_parser = duration, allow_negative_numbers = true)]
     pub max_time: Option<f64>,
 }
 
@@ -185,7 +185,7 @@ pub struct SolveArgs {
     pub design: Option<PathBuf>,
 
     /// Halve all edges of the design's mesh N times before it is analysed: eight times the elements each
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=6))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=6), allow_negative_numbers = true)]
     pub refine: u32,
 }
 

@@ -270,16 +270,11 @@ static PetscErrorCode insert_prolongation(fm_solver *solver, const fm_coarse_spa
     TRY(MatGetOwnershipRangesColumn(solver->prolongation, &ranges));
     PetscInt own = (PetscInt)space->own, shared = (PetscInt)space->shared;
     for (PetscInt row = 0; row < solver->own; row++) {
-        int holder = 0;
         for (uint32_t k = space->starts[row]; k < space->starts[row + 1]; k++) {
             PetscInt column = (PetscInt)space->columns[k], global = ranges[rank] + column;
             if (column >= own) {
-                while (column - own < first_shared(shared, size, holder)) {
-                    holder--;
-                }
-                while (column - own >= first_shared(shared, size, holder + 1)) {
-                    holder++;
-                }
+                /* The last rank whose first one is not beyond it. */
+                int holder = (int)(((int64_t)(column - own + 1) * size - 1) / shared);
                 global = ranges[holder + 1] - (first_shared(shared, size, holder + 1) - (column - own));
             }
             TRY(MatSetValue(solver->prolongation, solver->first + row, global, space->weights[k], INSERT_VALUES));

@@ -28,11 +28,11 @@ pub struct SweepArgs {
     pub out: Option<PathBuf>,
 
     /// Runs at a time [default: 1; in a script: as many as the scheduler allows]
-    #[arg(long, short, value_name = "N", value_parser = jobs)]
+    #[arg(long, short, value_name = "N", value_parser = jobs, allow_negative_numbers = true)]
     pub jobs: Option<usize>,
 
     /// Threads of each run [default: those of the machine, shared out]; the results do not depend on it
-    #[arg(long, value_name = "N", value_parser = threads)]
+    #[arg(long, value_name = "N", value_parser = threads, allow_negative_numbers = true)]
     pub threads: Option<usize>,
 
     /// The limits of every run.

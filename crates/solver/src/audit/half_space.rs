@@ -31,7 +31,8 @@ use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, s
 use fluxmorph_geometry::topology::{face_key, triangle_edges};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
-use crate::element::Complex3;
+use crate::element::triangle::Triangle;
+use crate::element::{Complex3, dot3};
 use crate::fixed_directions::CREASE;
 use crate::model::FieldModel;
 use crate::reentrant::{around_edges, is_reentrant};
@@ -165,17 +166,17 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
 impl SurfaceTriangle {
     /// Share of the square of the current in the direction of a unit vector along the surface.
     fn share_along(&self, direction: Point) -> f64 {
-        let part: c64 = (0..3).map(|d| self.field[d] * direction[d]).sum();
+        let part = dot3(self.field, direction.map(c64::from));
         let all = square(&self.field);
         if all > 0.0 { (part.norm_sqr() / all).min(1.0) } else { 0.0 }
     }
 }
 
 /// What a field has along a triangle with this area vector.
-fn along(area: Point, [x, y, z]: Complex3) -> Complex3 {
+fn along(area: Point, field: Complex3) -> Complex3 {
     let normal = unit(area);
-    let across = x * normal[0] + y * normal[1] + z * normal[2];
-    [x - across * normal[0], y - across * normal[1], z - across * normal[2]]
+    let across = dot3(field, normal.map(c64::from));
+    std::array::from_fn(|d| field[d] - across * normal[d])
 }
 
 /// `|E|²`
@@ -324,22 +325,21 @@ impl Bends {
         let [mut of_gradient, mut of_field] = [0.0; 2];
         for (nodes, own) in surface.iter().zip(triangles) {
             of_field += norm(own.area) * square(&own.field);
-            let [a, b, c] = nodes.map(|node| mesh.point(node));
+            let vertices = nodes.map(|node| mesh.point(node));
             if nodes.iter().any(|node| self.creased.contains(node))
-                || near.contains(&cell(centroid([a, b, c])))
+                || near.contains(&cell(centroid(vertices)))
             {
                 continue;
             }
-            // Opposite the vertices, whose functions have them as gradients, turned by a right angle and over twice the area.
-            let opposite = [sub(c, b), sub(a, c), sub(b, a)];
             let values = nodes.map(|node| {
                 let (sum, weight) = means[&node];
                 // On a round surface a field that turns with it does not change.
                 along(own.area, sum.map(|c| c / weight))
             });
-            for d in 0..3 {
-                let turned = [0, 1, 2].map(|i| (0..3).map(|k| values[k][d] * opposite[k][i]).sum::<c64>());
-                of_gradient += square(&turned) / (4.0 * norm(own.area));
+            for (value, row) in values.iter().zip(Triangle::new(vertices).metric) {
+                for (other, product) in values.iter().zip(row) {
+                    of_gradient += product * (0..3).map(|d| (value[d].conj() * other[d]).re).sum::<f64>();
+                }
             }
         }
         if of_field > 0.0 { of_gradient / of_field } else { 0.0 }

@@ -24,7 +24,7 @@ pub mod quadratic;
 pub mod quadrature;
 pub mod tabulated;
 pub mod tensor;
-mod triangle;
+pub(crate) mod triangle;
 pub(crate) mod virtual_work;
 pub mod volume;
 
