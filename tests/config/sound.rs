@@ -103,6 +103,25 @@ fn a_word_of_an_earlier_version_is_read_as_the_new_one_with_a_notice() {
     assert!(setup.warnings.iter().any(|warning| warning == notice), "{:?}", setup.warnings);
 }
 
+/// What the set-up of a shipped configuration warns of with a change.
+fn warnings_of(name: &str, change: &str) -> String {
+    let (config, source) =
+        Config::from_file(&repository("configs").join(name), &[change.to_owned()]).expect("sound");
+    set_up(&config, &source, Mode::Optimisation).expect("a sound device").warnings.join("\n")
+}
+
+#[test]
+fn what_is_rarely_meant_is_said_by_every_command() {
+    let size = warnings_of("shield_quick.toml", "design.upper=10");
+    assert!(size.contains("design.upper is 10 m, more than the whole mesh"), "{size}");
+    // The upper half of a winding, and its core, of which no plane takes a force that its turns feel.
+    let of = |region: &str| {
+        warnings_of("inductor.toml", &format!("forces=[{{name=\"half\", regions=[\"{region}\"]}}]"))
+    };
+    assert!(of("coil").contains("the surface `middle` cuts the winding `half`"), "{}", of("coil"));
+    assert!(!of("core").contains("cuts the winding"), "{}", of("core"));
+}
+
 /// The far side of the shell that is put around a mesh has its condition: no patch of the outside lies on it.
 #[test]
 fn space_that_is_open_is_no_side_without_a_condition() {

@@ -14,7 +14,8 @@ use crate::config::{Config, ForceBody, ObjectiveKind};
 /// What is to be said of all bodies; `coils` are those of the configuration.
 pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
     let bodies = config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body));
-    bodies.chain(cut_warnings(config, mesh)).collect()
+    let cut = config.forces.iter().filter_map(|body| cut_winding_warning(config, mesh, body));
+    bodies.chain(cut).chain(cut_warnings(config, mesh)).collect()
 }
 
 /// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
@@ -43,6 +44,24 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
     Some(format!(
         "the body `{name}` is joined to the iron of `{joined}`: where iron meets iron the force on one side depends on the mesh; \
          take `{joined}` into its regions, or leave air between the two"
+    ))
+}
+
+/// What to say of a winding that a plane cuts: the force that its conductors feel across that is another.
+fn cut_winding_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option<String> {
+    let topology = mesh.topology();
+    let wound = body.regions.iter().filter(|name| is_wound(config, name));
+    let wound: Vec<[NodeId; 3]> = wound
+        .filter_map(|name| topology.region(name).ok())
+        .flat_map(|own| topology.outer_faces(own))
+        .collect();
+    let cut = config.boundaries.surfaces().find(|surface| {
+        let faces = faces_of(topology, [surface.as_str()]);
+        wound.iter().any(|face| faces.contains(&face_key(*face)))
+    })?;
+    Some(format!(
+        "the surface `{cut}` cuts the winding `{}`: its force across that, as the axial one of half a winding, is the one on the free          faces of the meshed part, without the stress in the cut, and not the J × B of its turns; mesh the whole winding for it",
+        body.name
     ))
 }
 

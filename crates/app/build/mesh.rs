@@ -11,7 +11,7 @@ use fluxmorph_geometry::generate::{block, boxes, shield, sphere};
 use fluxmorph_geometry::io::msh::{MshError, Place as MshPlace};
 use fluxmorph_geometry::io::read_msh_file;
 use fluxmorph_geometry::topology::{OUTSIDE, face_key};
-use fluxmorph_geometry::{Mesh, MeshError, NodeId, Topology};
+use fluxmorph_geometry::{Mesh, MeshError, NodeId, RegionId, Topology};
 use fluxmorph_optimizer::design::DesignSurface;
 
 use super::open;
@@ -153,10 +153,30 @@ pub(super) fn surface_faults(config: &Config, source: &SourceMap, topology: &Top
             Err(MeshError::NoInterface { .. }) => source
                 .diagnostic(&path, format!("the two sides of `{name}` have no face in common"))
                 .expected("two regions that touch, or a region that reaches the outside"),
-            _ => source.unknown_name(&path, "surface", name, &surfaces),
+            _ => match faces_of_region(topology, name) {
+                Some(faces) => {
+                    source.diagnostic(&path, format!("`{name}` is a region, and no surface")).expected(faces)
+                }
+                None => source.unknown_name(&path, "surface", name, &surfaces),
+            },
         }),
     };
     surface_names(config).into_iter().filter(|(_, name)| !name.is_empty()).filter_map(fault).collect()
+}
+
+/// How to name the faces of a region, by the region on their other side; `None` where there is no such region.
+fn faces_of_region(topology: &Topology, name: &str) -> Option<String> {
+    let own = topology.region(name).ok()?;
+    let mut names = Vec::new();
+    for (k, other) in topology.region_names().iter().enumerate() {
+        if !topology.interface(own, RegionId::new(k)).is_empty() {
+            names.push(format!("`{name}|{other}`"));
+        }
+    }
+    if !topology.outer_faces(own).is_empty() {
+        names.push(format!("`{name}|{OUTSIDE}`"));
+    }
+    Some(format!("one of its faces: {}", names.join(", ")))
 }
 
 /// Every condition on a surface that does not lie at the outside of the mesh.

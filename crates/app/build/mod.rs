@@ -270,6 +270,7 @@ fn look_at_mesh(
         warnings.extend(soundness::swap_warning(config, mesh));
         open = outside.open;
     }
+    warnings.extend(soundness::length_warnings(config, mesh));
     warnings.extend(soundness::layer_warnings(config, mesh));
     Ok(open)
 }

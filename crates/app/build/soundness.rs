@@ -108,6 +108,25 @@ pub(super) fn unit_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     })
 }
 
+/// Lengths of the design beyond the size of the mesh.
+pub(super) fn length_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let Some(design) = &config.design else { return Vec::new() };
+    let [low, high] = mesh.bounding_box();
+    let size = norm(sub(high, low));
+    let lengths = [
+        ("lower", Some(-design.lower)),
+        ("upper", Some(design.upper)),
+        ("filter_radius", design.filter_radius),
+    ];
+    let warning = |(key, length): (&str, Option<f64>)| {
+        let length = length.filter(|length| *length > size)?;
+        Some(format!(
+            "design.{key} is {length} m, more than the whole mesh ({size:.4} m): a number without unit is in metres"
+        ))
+    };
+    lengths.into_iter().filter_map(warning).collect()
+}
+
 /// Iron or a conductor where air is expected.
 pub(super) fn swap_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     let MeshConfig::File { .. } = &config.mesh else { return None };

@@ -189,7 +189,19 @@ pub struct Verification {
     pub constraints: Vec<ConstraintResult>,
 }
 
+impl Verification {
+    /// The constraints that the best design violates there.
+    pub fn violated(&self) -> impl Iterator<Item = &ConstraintResult> {
+        self.constraints.iter().filter(|constraint| !constraint.satisfied)
+    }
+}
+
 impl ObjectiveResult {
+    /// Whether its best design violates a constraint on the mesh of a check.
+    pub fn is_violated_on_finer_mesh(&self) -> bool {
+        self.verification.as_ref().is_some_and(|found| found.violated().next().is_some())
+    }
+
     /// Whether its ratio was computed again on the elements of the run, cut.
     pub fn is_verified_on_cut_elements(&self) -> bool {
         self.verification.as_ref().is_some_and(|found| found.mesh == VerificationMesh::Cut)

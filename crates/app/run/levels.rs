@@ -76,6 +76,8 @@ pub(super) struct Levels<'a> {
     pub(super) warnings: Vec<String>,
     /// The problem on the mesh that was refined during a search, until that has ended.
     pub(super) finer: Option<Box<Setup>>,
+    /// Time that looking and refining took [s].
+    pub(super) seconds: f64,
 }
 
 impl<'a> Levels<'a> {
@@ -99,6 +101,7 @@ impl<'a> Levels<'a> {
             looked: None,
             warnings: Vec::new(),
             finer: None,
+            seconds: 0.0,
         }))
     }
 
@@ -287,11 +290,25 @@ impl Supervisor for Levels<'_> {
         standing: &Standing<'_>,
         observer: &mut dyn Observer,
     ) -> Result<Option<StopReason>, OptimizerError> {
-        let &Standing { problem, evaluations, initial, best_evaluation, best, deadline } = standing;
+        let &Standing { evaluations, best_evaluation, .. } = standing;
         let before = self.looked.replace([evaluations, best_evaluation]);
         if before.is_some_and(|[_, best]| best == best_evaluation) {
             return Ok(None);
         }
+        let clock = Instant::now();
+        let reason = self.refine_during_search(standing, observer);
+        self.seconds += clock.elapsed().as_secs_f64();
+        reason
+    }
+}
+
+impl Levels<'_> {
+    /// Estimates the error of the best design so far, and refines the mesh for it: why the search on this one is to end.
+    fn refine_during_search(
+        &mut self,
+        &Standing { problem, evaluations, initial, best, deadline, .. }: &Standing<'_>,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<StopReason>, OptimizerError> {
         let Some(errors) = self.estimator(problem).errors(best, observer) else { return Ok(None) };
         let refined = self.refine(
             &Looked {

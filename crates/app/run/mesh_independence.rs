@@ -140,7 +140,7 @@ impl MeshIndependence<'_> {
         };
         match outcome {
             Ok(Outcome::Found(verification)) => {
-                for constraint in verification.constraints.iter().filter(|constraint| !constraint.satisfied) {
+                for constraint in verification.violated() {
                     let (name, bound) = (&constraint.name, constraint.bound);
                     observer.warning(&format!(
                         "on the finer mesh the best shape violates the constraint `{name}`: {}",

@@ -200,7 +200,7 @@ impl Session<'_> {
         observer: &mut dyn RunObserver,
     ) -> Result<RunResult, Error> {
         let config = self.config;
-        let Searched { optimised, first, at_best, refinements, parents } =
+        let Searched { optimised, first, at_best, refinements, refinement_seconds, parents } =
             self.search(&mut recorder, observer)?;
         self.facets.refine(parents);
         let best = &optimised.best;
@@ -245,6 +245,7 @@ impl Session<'_> {
         let mut seconds = 0.0;
         let errors = timed(&mut seconds, || self.estimate_errors(first, (best, reason), at_best, observer));
         result.timings_s.insert("estimate".to_owned(), seconds);
+        result.timings_s.extend(refinement_seconds.map(|seconds| ("refinement".to_owned(), seconds)));
         if let Some((at_initial, at_best)) = &errors {
             let errors = (at_initial, at_best);
             self.enter_estimates(&mut result, (&optimised, errors), &mut recorder, observer)?;

@@ -8,15 +8,15 @@ use fluxmorph_optimizer::Error as OptimizerError;
 
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
-use super::{Concluded, Options, Session};
-use crate::build::Mode;
-use crate::config::{Config, SourceMap};
+use super::{Concluded, Options, Session, mesh_hash};
+use crate::build::{Mode, build_mesh};
+use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 use crate::files::{
     Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
     surface_files,
 };
-use crate::run::journal::{Contents, Identity, Journal, Rest, changed_key};
+use crate::run::journal::{Contents, Identity, Journal, Rest, changed_key, other_mesh};
 use crate::show::RunObserver;
 
 /// Largest configuration that is read [bytes].
@@ -98,12 +98,17 @@ pub(crate) fn resume_held(
         observer.note(&format!("nothing to resume: {}", advice(&result)));
         return Ok(Concluded { result, directory, is_saved: true });
     }
-    let prepared = Prepared::new(&config, &source, Mode::Optimisation, options, observer).map_err(
-        |error| match error {
-            Error::Optimizer(OptimizerError::Interrupted) => OptimizerError::InterruptedRun.into(),
-            other => other,
-        },
-    )?;
+    let prepared = match Prepared::new(&config, &source, Mode::Optimisation, options, observer) {
+        Ok(prepared) => prepared,
+        Err(Error::Optimizer(OptimizerError::Interrupted)) => {
+            return Err(OptimizerError::InterruptedRun.into());
+        }
+        Err(error) => {
+            let path = directory.journal();
+            let other = other_mesh_than(&manifest, &config, &source);
+            return Err(other.map_or(error, |cause| Error::OtherRun { path, cause }));
+        }
+    };
     let mut session = prepared.session("run", directory.clone(), manifest);
     session.check_levels()?;
     let contents = journal(&directory, (&session.identity(), &config), observer)?;
@@ -138,6 +143,13 @@ impl Session<'_> {
             }
         }
     }
+}
+
+/// That the mesh file is not the one that a run was started with, where it is not: its faults are none of the configuration.
+fn other_mesh_than(manifest: &Manifest, config: &Config, source: &SourceMap) -> Option<String> {
+    let was = manifest.mesh.as_ref().filter(|_| matches!(config.mesh, MeshConfig::File { .. }))?;
+    let is = mesh_hash(config, &build_mesh(config, source).ok()?);
+    (is.blake3 != was.blake3).then(|| other_mesh(&was.blake3, &is.blake3))
 }
 
 fn not_resumable(directory: &RunDirectory, cause: String) -> Error {

@@ -9,10 +9,10 @@ use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason, 
 use fluxmorph_optimizer::problem::{Derivatives, NoProgress, SolverCache};
 use fluxmorph_remesh::Moved;
 
-use super::Session;
 use super::estimate::Estimate;
 use super::levels::{Levels, Looked, Refined};
 use super::recorder::DirectoryRecorder;
+use super::{Session, timed};
 use crate::config::ElementOrder;
 use crate::error::Error;
 use crate::files::Refinements;
@@ -28,6 +28,8 @@ pub(super) struct Searched {
     pub(super) at_best: Option<Estimate>,
     /// How the mesh was refined; `None` without a tolerance.
     pub(super) refinements: Option<Refinements>,
+    /// The time that took, with the estimates for it [s].
+    pub(super) refinement_seconds: Option<f64>,
     /// Of every node that the mesh of the configuration does not have, the two in whose middle it lies.
     pub(super) parents: Vec<[NodeId; 2]>,
 }
@@ -78,7 +80,9 @@ impl<'a> Session<'a> {
         let mut limit = TimeLimit::starting_now(settings.max_time);
         let mut levels = self.levels(observer)?;
         if let Some(levels) = &mut levels {
-            self.refine_before_search(levels, recorder.next_level(), &mut limit, observer)?;
+            let (begun, mut seconds) = (recorder.next_level(), 0.0);
+            timed(&mut seconds, || self.refine_before_search(levels, begun, &mut limit, observer))?;
+            levels.seconds += seconds;
         }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
         let mut before: Option<Optimised> = None;
@@ -106,7 +110,13 @@ impl<'a> Session<'a> {
             }
             let mut optimised = sum(before.take(), found);
             let (refined, at_best) = match &mut levels {
-                Some(levels) => self.refine_after_search(levels, &optimised, &limit, observer)?,
+                Some(levels) => {
+                    let mut seconds = 0.0;
+                    let after = || self.refine_after_search(levels, &optimised, &limit, observer);
+                    let refined = timed(&mut seconds, after)?;
+                    levels.seconds += seconds;
+                    refined
+                }
                 None => (Refined::No, None),
             };
             match refined {
@@ -119,8 +129,16 @@ impl<'a> Session<'a> {
                         optimised.warnings.append(&mut levels.warnings);
                     }
                     let parents = levels.as_ref().map_or_else(Vec::new, |levels| levels.parents().to_vec());
+                    let refinement_seconds = levels.as_ref().map(|levels| levels.seconds);
                     let refinements = levels.map(Levels::into_refinements);
-                    return Ok(Searched { optimised, first, at_best, refinements, parents });
+                    return Ok(Searched {
+                        optimised,
+                        first,
+                        at_best,
+                        refinements,
+                        refinement_seconds,
+                        parents,
+                    });
                 }
             }
             start = Start {

@@ -190,6 +190,11 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
         };
         let (name, text) = if named.is_of_shape {
             (of_constraints, constraints_text(found, styles))
+        } else if objective.is_violated_on_finer_mesh() {
+            (
+                of_ratio,
+                format!("{}, constraints {}", super::ratio(found.ratio), constraints_text(found, styles)),
+            )
         } else {
             (of_ratio, super::ratio(found.ratio))
         };
@@ -215,6 +220,9 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
             Verdict::Confirmed if accuracy.hides_gain(*ratio) => {
                 (styles.bad, ", but smaller than its error bar")
             }
+            Verdict::Confirmed if objective.is_violated_on_finer_mesh() => {
+                (styles.bad, ", but of a shape that violates constraints on a finer mesh")
+            }
             Verdict::Confirmed => (styles.good, ""),
             Verdict::NotConfirmed => (styles.bad, ""),
         };
@@ -233,8 +241,7 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
 
 /// Whether the best shape keeps all constraints on the mesh of a check.
 fn constraints_text(found: &Verification, styles: &Styles) -> String {
-    let broken = found.constraints.iter().filter(|constraint| !constraint.satisfied);
-    let broken: Vec<&str> = broken.map(|constraint| constraint.name.as_str()).collect();
+    let broken: Vec<&str> = found.violated().map(|constraint| constraint.name.as_str()).collect();
     if broken.is_empty() {
         return "kept".to_owned();
     }
@@ -379,8 +386,18 @@ fn states(result: &RunResult) -> Vec<(String, State<'_>)> {
 fn times(result: &RunResult) -> String {
     let of = |name: &str| result.timings_s.get(name).copied().unwrap_or_default();
     let total = of("total");
-    let parts =
-        ["setup", "remesh", "assembly", "factor", "state", "adjoint", "gradient", "estimate", "verification"];
+    let parts = [
+        "setup",
+        "remesh",
+        "assembly",
+        "factor",
+        "state",
+        "adjoint",
+        "gradient",
+        "refinement",
+        "estimate",
+        "verification",
+    ];
     let shown: Vec<String> = parts
         .into_iter()
         .filter(|part| of(part) >= 0.1 * total && of(part) > 0.0)

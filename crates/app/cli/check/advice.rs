@@ -15,8 +15,6 @@ const POOR: f64 = 0.05;
 
 /// Sentences for what looks unlike what is meant; none for most configurations.
 pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
-    let [low, high] = setup.full_mesh.bounding_box();
-    let size = norm(sub(high, low));
     let mut all = Vec::new();
     let is_file = matches!(config.mesh, MeshConfig::File { .. });
     let has_field = !config.coils.is_empty() || config.objective.is_some();
@@ -35,20 +33,6 @@ pub(super) fn advice(config: &Config, setup: &Setup) -> Vec<String> {
             mesh.topology().region_name_at(worst),
             millimetres(centroid(mesh.vertices(worst)))
         ));
-    }
-    if let Some(design) = &config.design {
-        let lengths = [
-            ("lower", Some(-design.lower)),
-            ("upper", Some(design.upper)),
-            ("filter_radius", design.filter_radius),
-        ];
-        for (key, length) in lengths {
-            if let Some(length) = length.filter(|length| *length > size) {
-                all.push(format!(
-                    "design.{key} is {length} m, more than the whole mesh ({size:.4} m): a number without unit is in metres"
-                ));
-            }
-        }
     }
     all
 }
@@ -85,10 +69,8 @@ mod tests {
     }
 
     #[test]
-    fn shipped_devices_are_as_meant_and_sizes_without_units_are_told() {
+    fn shipped_devices_are_as_meant() {
         assert_eq!(of("shield_quick.toml", &[]), Vec::<String>::new());
-        let advice = of("shield_quick.toml", &["design.upper=10"]);
-        assert!(advice.len() == 1 && advice[0].contains("design.upper is 10 m"), "{advice:?}");
     }
 
     #[test]

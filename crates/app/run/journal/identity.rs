@@ -47,7 +47,6 @@ impl Identity {
     /// # Errors
     /// The first difference, and what to do.
     pub fn check(&self, now: &Self) -> Result<(), String> {
-        let short = |hash: &str| hash.chars().take(16).collect::<String>();
         let sizes = |identity: &Self| format!("{} and {}", identity.variables, identity.constraints);
         Err(if self.version != now.version {
             format!(
@@ -62,11 +61,7 @@ impl Identity {
                 short(&now.configuration)
             )
         } else if self.mesh != now.mesh {
-            format!(
-                "it belongs to another mesh (hash {}, now {}): restore the mesh file that the run was started with",
-                short(&self.mesh),
-                short(&now.mesh)
-            )
+            other_mesh(&self.mesh, &now.mesh)
         } else if self.tables != now.tables {
             "it belongs to other B–H tables: a file that `bh_file` names has changed; restore it, manifest.json has its hash"
                 .to_owned()
@@ -76,6 +71,20 @@ impl Identity {
             return Ok(());
         })
     }
+}
+
+/// What there is to say of a run whose mesh is another now, by the hashes of both.
+pub fn other_mesh(was: &str, is: &str) -> String {
+    format!(
+        "it belongs to another mesh (hash {}, now {}): restore the mesh file that the run was started with",
+        short(was),
+        short(is)
+    )
+}
+
+/// The head of a hash, for messages.
+fn short(hash: &str) -> String {
+    hash.chars().take(16).collect()
 }
 
 /// BLAKE3 of everything in a configuration that an evaluation or the method depends on, hexadecimal.

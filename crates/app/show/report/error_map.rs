@@ -57,7 +57,7 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
     let range = (high / RANGE, high, Count::Logarithmic);
     let picture = Picture::new(outline, window, range, ColourMap::Field, "share of the error [%/cm³]");
     Ok(html! {
-        figure id="error-map" {
+        figure id="error-map" class="narrow" {
             (draw(data, &picture, &cut, ("error-cut", "Share of the estimated error", PERCENT_PER_CM3)))
             figcaption { (caption) }
         }

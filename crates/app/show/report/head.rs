@@ -103,6 +103,7 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
 fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
     let verdict = match accuracy.verdict? {
         Verdict::Confirmed if accuracy.hides_gain(objective.ratio) => "smaller than its error bar",
+        Verdict::Confirmed if objective.is_violated_on_finer_mesh() => "of a shape that violates constraints",
         Verdict::Confirmed => "confirmed",
         Verdict::NotConfirmed => "NOT CONFIRMED",
     };
@@ -135,7 +136,7 @@ fn finer_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
     let (value, remark) = match (objective.verified_ratio, &objective.verification) {
         (Some(ratio), Some(v)) => {
             let (parts, tets) = (trim_zeros(v.refinement, 3), group_digits(v.tets));
-            let violated = v.constraints.iter().filter(|constraint| !constraint.satisfied).count();
+            let violated = v.violated().count();
             let violated = match violated {
                 0 => String::new(),
                 1 => ", a constraint violated".to_owned(),

@@ -1,12 +1,13 @@
 //! Wall thickness of the designed bodies behind every design node, measured along the node's direction of motion.
 //!
-//! From each node `x` of the design surface a ray runs against its direction `d` to the body's opposite face. On the
-//! undeformed mesh it meets a triangle with corners `y_k` and normal `n`, at the weights `b_k`. On a moved mesh the thickness
-//! is the distance to the plane of that triangle, wherever it has moved,
+//! From each node `x` of the design surface a ray runs against its direction `d` to where it leaves the body. On the
+//! undeformed mesh it meets a triangle with corners `y_k` there, at the weights `b_k`. On a moved mesh the thickness is how far
+//! the node is along its direction from that point of the body's surface, wherever it has moved,
 //!
-//! `t = n·(x − y_0) / (n·d)`, `∂t/∂x = n / (n·d)`, `∂t/∂y_k = −b_k n / (n·d)`:
+//! `t = d·(x − Σ b_k y_k) / d·d`, `∂t/∂x = d / d·d`, `∂t/∂y_k = −b_k d / d·d`:
 //!
-//! the initial one plus the node's height where that face is held. A node without direction has no thickness.
+//! the initial one plus the node's height where that face is held. The plane of the triangle, which may turn by a right angle at a
+//! re-entrant edge, has no say in it. A node without direction has no thickness.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -31,6 +32,8 @@ struct Opposite {
     distance: f64,
     /// The triangle there.
     nodes: [NodeId; 3],
+    /// The weights of its nodes.
+    weights: Point,
     /// The region between, of the mesh that was measured.
     body: RegionId,
 }
@@ -72,11 +75,8 @@ impl WallThickness {
             }
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
-                let faces = &of[&body];
-                // Of a body with two designed faces, the other one.
-                let found =
-                    faces.others.nearest(origin, back).or_else(|| faces.designed.nearest(origin, back));
-                found.map(|(distance, nodes)| Some(Opposite { distance, nodes, body }))
+                let (Hit { distance, weights }, nodes) = of[&body].nearest(origin, back)?;
+                Some(Some(Opposite { distance, nodes, weights, body }))
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
             let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
@@ -119,8 +119,8 @@ impl WallThickness {
         place: impl Fn(NodeId) -> Point + 'a,
     ) -> impl Iterator<Item = (usize, Wall)> + 'a {
         self.opposite.iter().enumerate().filter_map(move |(i, opposite)| {
-            let nodes = (*opposite)?.nodes;
-            Some((i, wall((surface.nodes()[i], surface.directions()[i]), nodes, &place)))
+            let Opposite { nodes, weights, .. } = (*opposite)?;
+            Some((i, wall((surface.nodes()[i], surface.directions()[i]), (nodes, weights), &place)))
         })
     }
 
@@ -157,18 +157,19 @@ impl WallThickness {
     }
 }
 
-/// The wall between a design node with its direction and a triangle.
-fn wall((node, direction): (NodeId, Point), opposite: [NodeId; 3], place: &impl Fn(NodeId) -> Point) -> Wall {
-    let (x, corners) = (place(node), opposite.map(place));
-    let normal = area_vector(corners);
-    let slope = dot(normal, direction);
-    let thickness = dot(normal, sub(x, corners[0])) / slope;
-    let foot: Point = std::array::from_fn(|d| x[d] - thickness * direction[d]);
-    let weights = barycentric(&corners, foot);
-    let derivative = |weight: f64| normal.map(|c| weight * c / slope);
+/// The wall between a design node with its direction and the point of a triangle with these weights.
+fn wall(
+    (node, direction): (NodeId, Point),
+    (opposite, weights): ([NodeId; 3], Point),
+    place: &impl Fn(NodeId) -> Point,
+) -> Wall {
+    let along = direction.map(|c| c / dot(direction, direction));
     let [a, b, c] = opposite;
-    let derivatives = [(node, 1.0), (a, -weights[0]), (b, -weights[1]), (c, -weights[2])];
-    Wall { thickness, derivatives: derivatives.map(|(n, weight)| (n, derivative(weight))) }
+    let terms = [(node, 1.0), (a, -weights[0]), (b, -weights[1]), (c, -weights[2])];
+    Wall {
+        thickness: terms.iter().map(|&(n, weight)| weight * dot(along, place(n))).sum(),
+        derivatives: terms.map(|(n, weight)| (n, along.map(|c| weight * c))),
+    }
 }
 
 /// The faces between two regions that are part of the design surface, each with the element behind it, against the direction of
@@ -190,10 +191,12 @@ pub fn faces_with_bodies(mesh: &Mesh, surface: &DesignSurface) -> Vec<([NodeId; 
     mesh.topology().facets().iter().filter_map(with_body).collect()
 }
 
-/// The faces of a body that are part of the design surface, and its others.
+/// The faces of a body, found by rays.
 struct BodyFaces {
-    designed: Faces,
-    others: Faces,
+    nodes: Vec<[NodeId; 3]>,
+    corners: Vec<[Point; 3]>,
+    tree: BoxTree,
+    /// The nodes of those that are part of the design surface.
     designed_nodes: HashSet<NodeId>,
 }
 
@@ -201,48 +204,40 @@ impl BodyFaces {
     fn new(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Self {
         let topology = mesh.topology();
         let is_own = |e: ElementId| topology.region_of()[e.index()] == region;
-        let (designed, others): (Vec<[NodeId; 3]>, Vec<[NodeId; 3]>) = topology
-            .facets()
-            .iter()
-            .filter(|f| is_own(f.inside) != f.outside.is_some_and(is_own))
-            .map(|f| f.nodes)
-            .partition(|nodes| nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()));
-        let designed_nodes = designed.iter().flatten().copied().collect();
-        Self { designed: Faces::new(mesh, designed), others: Faces::new(mesh, others), designed_nodes }
+        let own = topology.facets().iter().filter(|f| is_own(f.inside) != f.outside.is_some_and(is_own));
+        let nodes: Vec<[NodeId; 3]> = own.map(|f| f.nodes).collect();
+        let is_designed = |face: &&[NodeId; 3]| face.iter().all(|n| surface.nodes().binary_search(n).is_ok());
+        let designed_nodes = nodes.iter().filter(is_designed).flatten().copied().collect();
+        let corners: Vec<[Point; 3]> = nodes.iter().map(|f| f.map(|n| mesh.point(n))).collect();
+        let tree = BoxTree::new(corners.iter().map(reach).collect());
+        Self { nodes, corners, tree, designed_nodes }
     }
 
     fn are_designed_at(&self, node: NodeId) -> bool {
         self.designed_nodes.contains(&node)
     }
-}
 
-/// Faces of a body, found by rays.
-struct Faces {
-    nodes: Vec<[NodeId; 3]>,
-    corners: Vec<[Point; 3]>,
-    tree: BoxTree,
-}
-
-impl Faces {
-    fn new(mesh: &Mesh, nodes: Vec<[NodeId; 3]>) -> Self {
-        let corners: Vec<[Point; 3]> = nodes.iter().map(|f| f.map(|n| mesh.point(n))).collect();
-        let tree = BoxTree::new(corners.iter().map(reach).collect());
-        Self { nodes, corners, tree }
-    }
-
-    /// The nearest face that a ray meets, with the distance [m]; one that it runs along, if there is no other.
-    fn nearest(&self, origin: Point, direction: Point) -> Option<(f64, [NodeId; 3])> {
+    /// The nearest face that a ray meets; one that it runs along, if there is no other.
+    fn nearest(&self, origin: Point, direction: Point) -> Option<(Hit, [NodeId; 3])> {
         let hits = self.tree.hits(origin, direction);
         // From a rim the ray runs along the facets of the body's side, and a round side is no plane.
         let across = |i: &usize| !runs_along(direction, &self.corners[*i]);
         let nearest = |of: &mut dyn Iterator<Item = usize>| {
-            let met = of.filter_map(|i| Some((distance(origin, direction, &self.corners[i])?, i)));
-            met.min_by(|a, b| a.0.total_cmp(&b.0))
+            let met = of.filter_map(|i| Some((hit(origin, direction, &self.corners[i])?, i)));
+            met.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance))
         };
         let found = nearest(&mut hits.iter().copied().filter(across));
-        let (distance, i) = found.or_else(|| nearest(&mut hits.iter().copied()))?;
-        Some((distance, self.nodes[i]))
+        let (hit, i) = found.or_else(|| nearest(&mut hits.iter().copied()))?;
+        Some((hit, self.nodes[i]))
     }
+}
+
+/// Where a ray meets a triangle.
+struct Hit {
+    /// Distance along it [m].
+    distance: f64,
+    /// The weights of the corners.
+    weights: Point,
 }
 
 /// Whether a ray runs along a triangle rather than through it.
@@ -257,18 +252,19 @@ fn reach(triangle: &[Point; 3]) -> AxisBox {
     tight.grown(10.0 * RIM_TOLERANCE * tight.extent())
 }
 
-/// Distance along the ray at which it meets a triangle that it does not touch at its origin.
-fn distance(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<f64> {
+/// Where a ray meets a triangle that it does not touch at its origin.
+fn hit(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<Hit> {
     let normal = area_vector(*triangle);
     let slope = dot(normal, direction);
     let area = norm(normal);
     if slope.abs() < RIM_TOLERANCE * area {
         return None;
     }
-    let t = dot(normal, sub(triangle[0], origin)) / slope;
-    let hit: Point = std::array::from_fn(|d| origin[d] + t * direction[d]);
-    let inside = barycentric(triangle, hit).into_iter().all(|share| share >= -RIM_TOLERANCE);
-    (inside && t > RIM_TOLERANCE * area.sqrt()).then_some(t)
+    let distance = dot(normal, sub(triangle[0], origin)) / slope;
+    let met: Point = std::array::from_fn(|d| origin[d] + distance * direction[d]);
+    let weights = barycentric(triangle, met);
+    let is_inside = weights.into_iter().all(|share| share >= -RIM_TOLERANCE);
+    (is_inside && distance > RIM_TOLERANCE * area.sqrt()).then_some(Hit { distance, weights })
 }
 
 /// Barycentric coordinates of a point in the plane of a triangle, by sub-areas.
@@ -306,8 +302,8 @@ mod tests {
         assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
     }
 
-    /// Layers between these heights with air below and above, and the face of each that is ahead as the design, which moves along z.
-    fn layers(heights: &[(&str, [f64; 2])], direction: f64) -> (Mesh, DesignSurface) {
+    /// Layers between these heights with air below and above.
+    fn layers(heights: &[(&str, [f64; 2])]) -> Mesh {
         let layer = |(name, [from, to]): &(&str, [f64; 2])| BoxRegion {
             name: (*name).to_owned(),
             corners: [[0.0, 0.0, *from], [1.0, 1.0, *to]],
@@ -315,7 +311,7 @@ mod tests {
             skin: [f64::INFINITY; 3],
             cells: None,
         };
-        let mesh = boxes(&BoxesParameters {
+        boxes(&BoxesParameters {
             corners: [[0.0, 0.0, -0.5], [1.0, 1.0, 1.7]],
             regions: heights.iter().map(layer).collect(),
             sizes: vec![],
@@ -324,17 +320,24 @@ mod tests {
             refinement: 1.0,
             division: None,
         })
-        .expect("layers");
-        let place = usize::from(direction > 0.0);
+        .expect("layers")
+    }
+
+    /// The faces at some heights as the design.
+    fn faces_at(mesh: &Mesh, heights: &[f64], direction: Direction) -> DesignSurface {
         let is_designed = |face: &[NodeId; 3]| {
-            let at = |z: f64| face.iter().all(|n| (mesh.point(*n)[2] - z).abs() < 1e-12);
-            heights.iter().any(|(_, ends)| at(ends[place]))
+            let at = |z: &f64| face.iter().all(|n| (mesh.point(*n)[2] - z).abs() < 1e-12);
+            heights.iter().any(at)
         };
-        let faces: Vec<[NodeId; 3]> =
-            mesh.topology().facets().iter().map(|facet| facet.nodes).filter(is_designed).collect();
-        let setup = DesignSetup::new(&faces, Direction::Along([0.0, 0.0, direction]));
-        let surface = DesignSurface::new(&mesh, &setup).expect("every node is a variable");
-        (mesh, surface)
+        // The first looks down.
+        let turned = |[a, b, c]: [NodeId; 3]| {
+            let looks_down = area_vector([a, b, c].map(|n| mesh.point(n)))[2] < 0.0;
+            let is_first = (mesh.point(a)[2] - heights[0]).abs() < 1e-12;
+            if looks_down == is_first { [a, b, c] } else { [a, c, b] }
+        };
+        let all = mesh.topology().facets().iter().map(|facet| facet.nodes);
+        let faces: Vec<[NodeId; 3]> = all.filter(is_designed).map(turned).collect();
+        DesignSurface::new(mesh, &DesignSetup::new(&faces, direction)).expect("every node is a variable")
     }
 
     /// Plates one behind the other and touching ones, whichever region comes first: what lies behind a face is its own body.
@@ -345,11 +348,13 @@ mod tests {
             for names in [["thin", "thick"], ["thick", "thin"]] {
                 let mut heights = [("thin", ends[0]), ("thick", ends[1])];
                 heights.sort_by_key(|(name, _)| *name != names[0]);
-                let (mesh, surface) = layers(&heights, direction);
+                let mesh = layers(&heights);
+                let designed = usize::from(direction > 0.0);
+                let places = heights.map(|(_, ends)| ends[designed]);
+                let surface = faces_at(&mesh, &places, Direction::Along([0.0, 0.0, direction]));
                 let regions = names.map(|name| mesh.topology().region(name).expect("it has both"));
                 let thickness =
                     WallThickness::measure(&mesh, &regions, &surface).expect("both have two faces");
-                let designed = usize::from(direction > 0.0);
                 for (i, t) in thickness.at_nodes() {
                     let is_thin = (mesh.point(surface.nodes()[i])[2] - ends[0][designed]).abs() < 1e-9;
                     let expected = if is_thin { 0.1 } else { 0.2 };
@@ -364,12 +369,24 @@ mod tests {
         }
     }
 
+    /// A leg with both faces designed beside another one that is held: its own other face is nearer than the other leg.
+    #[test]
+    fn a_wall_ends_where_its_body_does_first() {
+        let mesh = layers(&[("legs", [0.0, 0.1]), ("legs", [1.0, 1.2])]);
+        let surface = faces_at(&mesh, &[0.0, 0.1], Direction::Normal);
+        let legs = mesh.topology().region("legs").expect("it has them");
+        let thickness = WallThickness::measure(&mesh, &[legs], &surface).expect("it has two faces");
+        assert_eq!(thickness.at_nodes().count(), surface.nodes().len());
+        assert!(thickness.at_nodes().all(|(_, t)| (t - 0.1).abs() < 1e-12));
+    }
+
     #[test]
     fn a_wall_has_its_derivative_in_all_four_nodes() {
         let places = [[0.2, 0.1, 1.1], [-0.4, -0.3, 0.1], [1.2, -0.1, 0.2], [0.1, 1.3, -0.1]];
         let direction = [0.1, -0.2, 0.97];
         let [node, opposite @ ..] = [0, 1, 2, 3].map(NodeId);
-        let at = |places: &[Point; 4]| wall((node, direction), opposite, &|n| places[n.index()]);
+        let weights = [0.5, 0.2, 0.3];
+        let at = |places: &[Point; 4]| wall((node, direction), (opposite, weights), &|n| places[n.index()]);
         for (k, (own, derivative)) in at(&places).derivatives.into_iter().enumerate() {
             assert_eq!(own, NodeId::new(k));
             for d in 0..3 {
@@ -383,5 +400,12 @@ mod tests {
                 assert!((derivative[d] - difference).abs() < 1e-7, "{k} {d}: {} {difference}", derivative[d]);
             }
         }
+        // Corners that move across the direction turn the triangle, here until it is seen edgewise.
+        let across = [0.97, 0.0, -0.1];
+        let mut turned = places;
+        turned[1] = std::array::from_fn(|d| places[1][d] + 20.0 * across[d]);
+        let [was, is] = [places, turned].map(|places| at(&places).thickness);
+        // One rounding of numbers of order 20.
+        assert!((was - is).abs() < 1e-14, "{was} {is}");
     }
 }
