@@ -172,7 +172,7 @@ fn a_mesh_file_that_has_changed_is_refused() {
     std::fs::write(&mesh, whole.replacen(&format!("\n{corner}\n"), &format!("\n{other}\n"), 1))
         .expect("written");
     finish(resume(&out).args(["--max-evaluations", "4"])).with(3, &["another mesh", "restore the mesh file"]);
-    // One that the configuration does not suit is no fault of the configuration.
+    // One that does not suit the configuration is no error of that.
     std::fs::write(&mesh, whole.replace("\"face\"", "\"side\"")).expect("written");
     finish(resume(&out).args(["--max-evaluations", "4"])).with(3, &["another mesh", "restore the mesh file"]);
     std::fs::remove_file(&mesh).expect("there");

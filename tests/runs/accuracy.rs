@@ -210,6 +210,9 @@ fn a_run_with_a_tolerance_refines_its_mesh_until_its_error_bar_is_within() {
     let result = read_json(&out.join("result.json"));
     let refinements = count(&result, "/accuracy/refinements") as usize;
     assert!(refinements >= 1, "the mesh as shipped is too coarse");
+    let [refining, total] =
+        ["refinement", "total"].map(|part| number(&result, &format!("/timings_s/{part}")));
+    assert!(0.0 < refining && refining < total, "{refining} {total}");
     assert_eq!(result["accuracy"]["within_tolerance"], true);
     assert!(out.join("optimum_refined.msh").exists() && !out.join("optimum.msh").exists());
     let levels = result["accuracy"]["levels"].as_array().expect("a list");

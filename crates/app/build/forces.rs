@@ -14,7 +14,12 @@ use crate::config::{Config, ForceBody, ObjectiveKind};
 /// What is to be said of all bodies; `coils` are those of the configuration.
 pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
     let bodies = config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body));
-    let cut = config.forces.iter().filter_map(|body| cut_winding_warning(config, mesh, body));
+    // Of one that is sought for more is said.
+    let is_sought = |body: &&ForceBody| {
+        functionals(config).iter().any(|(_, own)| own.region.as_ref() == Some(&body.name))
+    };
+    let reported = config.forces.iter().filter(|body| !is_sought(body));
+    let cut = reported.filter_map(|body| cut_winding_warning(config, mesh, body));
     bodies.chain(cut).chain(cut_warnings(config, mesh)).collect()
 }
 
@@ -47,27 +52,44 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
     ))
 }
 
-/// What to say of a winding that a plane cuts: the force that its conductors feel across that is another.
+/// What to say of a winding that a surface cuts: the force that its turns feel across that is another.
 fn cut_winding_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option<String> {
-    let topology = mesh.topology();
-    let wound = body.regions.iter().filter(|name| is_wound(config, name));
-    let wound: Vec<[NodeId; 3]> = wound
-        .filter_map(|name| topology.region(name).ok())
-        .flat_map(|own| topology.outer_faces(own))
-        .collect();
-    let cut = config.boundaries.surfaces().find(|surface| {
-        let faces = faces_of(topology, [surface.as_str()]);
-        wound.iter().any(|face| faces.contains(&face_key(*face)))
-    })?;
+    if !body.regions.iter().any(|name| is_wound(config, name)) {
+        return None;
+    }
+    let cut = cutting_surface(config, mesh, body, |_| true)?;
     Some(format!(
-        "the surface `{cut}` cuts the winding `{}`: its force across that, as the axial one of half a winding, is the one on the free          faces of the meshed part, without the stress in the cut, and not the J × B of its turns; mesh the whole winding for it",
+        "{cut} cuts the winding `{}`: its force across that, as the axial one of half a winding, is the one on the free faces of the \
+         meshed part, without the stress in the cut, and not the J × B of its turns; mesh the whole winding for it",
         body.name
     ))
 }
 
+/// The surface that cuts a body, in words: one with a condition before one without; of faces that count.
+fn cutting_surface(
+    config: &Config,
+    mesh: &Mesh,
+    body: &ForceBody,
+    counts: impl Fn(&[NodeId; 3]) -> bool,
+) -> Option<String> {
+    let topology = mesh.topology();
+    let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
+    let outside: Vec<[NodeId; 3]> =
+        regions.flat_map(|region| topology.outer_faces(region)).filter(|face| counts(face)).collect();
+    let named = config.boundaries.surfaces().find(|surface| {
+        let faces = faces_of(topology, [surface.as_str()]);
+        outside.iter().any(|face| faces.contains(&face_key(*face)))
+    });
+    // Where no surface was found, none of them has a condition.
+    let natural = || {
+        let place = millimetres(centroid(outside.first()?.map(|node| mesh.point(node))));
+        Some(format!("the outer face at {place}, which has no condition,"))
+    };
+    named.map(|surface| format!("the surface `{surface}`")).or_else(natural)
+}
+
 /// What to say of forces and torques that are sought across a plane which cuts their body: of these only a part is computed.
 fn cut_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
-    let topology = mesh.topology();
     let mut warnings = Vec::new();
     for (path, own) in functionals(config) {
         let Some(body) = config.forces.iter().find(|body| Some(&body.name) == own.region.as_ref()) else {
@@ -80,26 +102,13 @@ fn cut_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
             ObjectiveKind::Torque => cross(direction, sub(x, body.about)),
             _ => [0.0; 3],
         };
-        let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
-        let outside: Vec<[NodeId; 3]> = regions.flat_map(|region| topology.outer_faces(region)).collect();
         // Outer faces hold the nodes of the body (`Force`), with a condition or without.
         let goes_across = |face: &[NodeId; 3]| {
             let corners = face.map(|node| mesh.point(node));
             let (area, v) = (area_vector(corners), velocity(centroid(corners)));
             dot(v, area).abs() > INCLINED * norm(v) * norm(area)
         };
-        let cut = config.boundaries.surfaces().find(|surface| {
-            let faces = faces_of(topology, [surface.as_str()]);
-            outside.iter().any(|face| faces.contains(&face_key(*face)) && goes_across(face))
-        });
-        let natural = || {
-            let named = faces_of(topology, config.boundaries.surfaces().map(String::as_str));
-            let face = outside.iter().find(|face| !named.contains(&face_key(**face)) && goes_across(face))?;
-            let place = millimetres(centroid(face.map(|node| mesh.point(node))));
-            Some(format!("the outer face at {place}, which has no condition,"))
-        };
-        let cut = cut.map(|surface| format!("the surface `{surface}`")).or_else(natural);
-        if let Some(surface) = cut {
+        if let Some(surface) = cutting_surface(config, mesh, body, goes_across) {
             let of_magnet = if body.regions.iter().any(|name| is_magnet(config, name)) {
                 "; of a magnet it comes from the singular field beside the cut, and its error bar is far too small"
             } else {

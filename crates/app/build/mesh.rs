@@ -153,30 +153,26 @@ pub(super) fn surface_faults(config: &Config, source: &SourceMap, topology: &Top
             Err(MeshError::NoInterface { .. }) => source
                 .diagnostic(&path, format!("the two sides of `{name}` have no face in common"))
                 .expected("two regions that touch, or a region that reaches the outside"),
-            _ => match faces_of_region(topology, name) {
-                Some(faces) => {
-                    source.diagnostic(&path, format!("`{name}` is a region, and no surface")).expected(faces)
-                }
-                None => source.unknown_name(&path, "surface", name, &surfaces),
+            _ => match faces_of_region(topology, name, &path).as_slice() {
+                [] => source.unknown_name(&path, "surface", name, &surfaces),
+                faces => source
+                    .diagnostic(&path, format!("`{name}` is a region, and no surface"))
+                    .expected(format!("one of its faces: {}", faces.join(", "))),
             },
         }),
     };
     surface_names(config).into_iter().filter(|(_, name)| !name.is_empty()).filter_map(fault).collect()
 }
 
-/// How to name the faces of a region, by the region on their other side; `None` where there is no such region.
-fn faces_of_region(topology: &Topology, name: &str) -> Option<String> {
-    let own = topology.region(name).ok()?;
-    let mut names = Vec::new();
-    for (k, other) in topology.region_names().iter().enumerate() {
-        if !topology.interface(own, RegionId::new(k)).is_empty() {
-            names.push(format!("`{name}|{other}`"));
-        }
-    }
-    if !topology.outer_faces(own).is_empty() {
-        names.push(format!("`{name}|{OUTSIDE}`"));
-    }
-    Some(format!("one of its faces: {}", names.join(", ")))
+/// How to name the faces of a region, by the region on their other side; of a condition those at the outside alone.
+fn faces_of_region(topology: &Topology, name: &str, path: &str) -> Vec<String> {
+    let Ok(own) = topology.region(name) else { return Vec::new() };
+    let is_condition = path.starts_with("boundaries.");
+    let touches = |k: &usize| !is_condition && !topology.interface(own, RegionId::new(*k)).is_empty();
+    let others = topology.region_names();
+    let inside = (0..others.len()).filter(touches).map(|k| others[k].as_str());
+    let outside = Some(OUTSIDE).filter(|_| !topology.outer_faces(own).is_empty());
+    inside.chain(outside).map(|other| format!("`{name}|{other}`")).collect()
 }
 
 /// Every condition on a surface that does not lie at the outside of the mesh.

@@ -43,7 +43,7 @@ pub struct OutlinedDesign {
     pub triangles: Vec<[NodeId; 3]>,
     /// The regions that a positive design thickens; else those with an entry of their own at the surface; else none.
     pub bodies: Vec<RegionId>,
-    /// Thickness of the designed bodies, where they have one and their opposite faces are held.
+    /// Thickness of the designed bodies, where they have one and all that lies opposite is held.
     pub thickness: Option<WallThickness>,
     /// Elements of `mesh` that may move, ascending.
     pub moving: Vec<ElementId>,

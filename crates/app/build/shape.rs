@@ -338,17 +338,18 @@ fn vanishing_faults(
         };
         let left = thickness.walls(surface, moved).map(|(_, wall)| wall.thickness);
         let initial = thickness.at_nodes().map(|(_, thickness)| thickness);
-        let thinnest = left.zip(initial).min_by(|a, b| a.0.total_cmp(&b.0));
-        let Some((least, thickness)) = thinnest.filter(|(least, _)| *least <= 0.0) else { continue };
+        // Of the bound, the share that takes all of the wall: the least one is what is left to go to.
+        let spent = left.zip(initial).filter(|(left, _)| *left <= 0.0);
+        let share = spent.map(|(left, thickness)| (thickness / (thickness - left), thickness));
+        let Some((share, thickness)) = share.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
         let message = format!(
             "`{key}` is {:.3} mm, and the body is {:.3} mm thick there: nothing would be left of it",
             Millimetres(bound),
             Millimetres(thickness)
         );
         let fault = source.diagnostic(key, message);
-        let share = bound * thickness / (thickness - least);
-        faults
-            .push(fault.expected(format!("a bound nearer to zero than {:.3} mm{doubt}", Millimetres(share))));
+        let most = Millimetres(share * bound);
+        faults.push(fault.expected(format!("a bound nearer to zero than {most:.3} mm{doubt}")));
     }
     faults
 }

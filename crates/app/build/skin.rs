@@ -257,7 +257,7 @@ pub(crate) fn least_thickness(
     least.into_iter().map(|(region, least)| (name(region), least)).collect()
 }
 
-/// That for the variables `p`, with opposite faces as they were, or the least that a constraint allows.
+/// That for the variables `p`, with all nodes but those of the design as they were, or the least that a constraint allows.
 fn thinnest(config: &Config, (mesh, full_mesh): (&Mesh, &Mesh), shape: &Shape, p: &[f64]) -> LeastThickness {
     let surface = shape.surface();
     let displacement = shape.displacement(p);

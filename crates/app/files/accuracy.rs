@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::refinements::{RefinementStep, Refinements};
+use super::result::ObjectiveResult;
 
 /// Least share of a gain, as a ratio, that must be left in another discretisation.
 const LEAST_SHARE: f64 = 0.5;
@@ -149,6 +150,17 @@ impl Accuracy {
     pub fn hides_gain(&self, ratio: f64) -> bool {
         let bar = self.error_estimate_relative.map(|error| SAFETY * error * ratio.abs());
         self.verdict == Some(Verdict::Confirmed) && bar.is_some_and(|bar| bar >= (ratio - 1.0).abs())
+    }
+
+    /// What is to be said of a gain that is confirmed.
+    pub fn reservation(&self, objective: &ObjectiveResult) -> Option<&'static str> {
+        match self.verdict? {
+            Verdict::NotConfirmed => None,
+            Verdict::Confirmed if self.hides_gain(objective.ratio) => Some("smaller than its error bar"),
+            Verdict::Confirmed => objective
+                .is_violated_on_finer_mesh()
+                .then_some("of a shape that violates constraints on the finer mesh"),
+        }
     }
 
     /// Whether there is something that no estimate of the field counts.

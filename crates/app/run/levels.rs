@@ -76,7 +76,7 @@ pub(super) struct Levels<'a> {
     pub(super) warnings: Vec<String>,
     /// The problem on the mesh that was refined during a search, until that has ended.
     pub(super) finer: Option<Box<Setup>>,
-    /// Time that looking and refining took [s].
+    /// Time that error estimates and finer meshes took [s].
     pub(super) seconds: f64,
 }
 
@@ -295,14 +295,19 @@ impl Supervisor for Levels<'_> {
         if before.is_some_and(|[_, best]| best == best_evaluation) {
             return Ok(None);
         }
-        let clock = Instant::now();
-        let reason = self.refine_during_search(standing, observer);
-        self.seconds += clock.elapsed().as_secs_f64();
-        reason
+        self.timed(|levels| levels.refine_during_search(standing, observer))
     }
 }
 
 impl Levels<'_> {
+    /// Does a part of the work of refining, and adds its time.
+    pub(super) fn timed<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
+        let clock = Instant::now();
+        let done = work(self);
+        self.seconds += clock.elapsed().as_secs_f64();
+        done
+    }
+
     /// Estimates the error of the best design so far, and refines the mesh for it: why the search on this one is to end.
     fn refine_during_search(
         &mut self,

@@ -16,7 +16,7 @@ use crate::files::{
     Disk, LimitsInForce, Manifest, OutputError, Resumption, RunDirectory, RunResult, RunStatus, StopReason,
     surface_files,
 };
-use crate::run::journal::{Contents, Identity, Journal, Rest, changed_key, other_mesh};
+use crate::run::journal::{Contents, Identity, Journal, Rest, changed_key, describe_meshes};
 use crate::show::RunObserver;
 
 /// Largest configuration that is read [bytes].
@@ -105,7 +105,7 @@ pub(crate) fn resume_held(
         }
         Err(error) => {
             let path = directory.journal();
-            let other = other_mesh_than(&manifest, &config, &source);
+            let other = describe_other_mesh(&manifest, &config, &source);
             return Err(other.map_or(error, |cause| Error::OtherRun { path, cause }));
         }
     };
@@ -145,11 +145,11 @@ impl Session<'_> {
     }
 }
 
-/// That the mesh file is not the one that a run was started with, where it is not: its faults are none of the configuration.
-fn other_mesh_than(manifest: &Manifest, config: &Config, source: &SourceMap) -> Option<String> {
+/// That the mesh file is not the one that a run was started with, where it is not: what it lacks is no error of the configuration.
+fn describe_other_mesh(manifest: &Manifest, config: &Config, source: &SourceMap) -> Option<String> {
     let was = manifest.mesh.as_ref().filter(|_| matches!(config.mesh, MeshConfig::File { .. }))?;
     let is = mesh_hash(config, &build_mesh(config, source).ok()?);
-    (is.blake3 != was.blake3).then(|| other_mesh(&was.blake3, &is.blake3))
+    (is.blake3 != was.blake3).then(|| describe_meshes(&was.blake3, &is.blake3))
 }
 
 fn not_resumable(directory: &RunDirectory, cause: String) -> Error {

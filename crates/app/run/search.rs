@@ -9,10 +9,10 @@ use fluxmorph_optimizer::driver::{self, Optimised, Settings, Start, StopReason, 
 use fluxmorph_optimizer::problem::{Derivatives, NoProgress, SolverCache};
 use fluxmorph_remesh::Moved;
 
+use super::Session;
 use super::estimate::Estimate;
 use super::levels::{Levels, Looked, Refined};
 use super::recorder::DirectoryRecorder;
-use super::{Session, timed};
 use crate::config::ElementOrder;
 use crate::error::Error;
 use crate::files::Refinements;
@@ -80,9 +80,8 @@ impl<'a> Session<'a> {
         let mut limit = TimeLimit::starting_now(settings.max_time);
         let mut levels = self.levels(observer)?;
         if let Some(levels) = &mut levels {
-            let (begun, mut seconds) = (recorder.next_level(), 0.0);
-            timed(&mut seconds, || self.refine_before_search(levels, begun, &mut limit, observer))?;
-            levels.seconds += seconds;
+            let begun = recorder.next_level();
+            levels.timed(|levels| self.refine_before_search(levels, begun, &mut limit, observer))?;
         }
         let mut start = Start { level: levels.as_ref().map_or(0, |levels| levels.made), ..Start::default() };
         let mut before: Option<Optimised> = None;
@@ -111,11 +110,7 @@ impl<'a> Session<'a> {
             let mut optimised = sum(before.take(), found);
             let (refined, at_best) = match &mut levels {
                 Some(levels) => {
-                    let mut seconds = 0.0;
-                    let after = || self.refine_after_search(levels, &optimised, &limit, observer);
-                    let refined = timed(&mut seconds, after)?;
-                    levels.seconds += seconds;
-                    refined
+                    levels.timed(|levels| self.refine_after_search(levels, &optimised, &limit, observer))?
                 }
                 None => (Refined::No, None),
             };

@@ -8,9 +8,9 @@ use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
-    Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT, MultipoleResult,
-    ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult, StateErrors,
-    StateResult, Verdict, Verification, VerificationMesh, WHERE_LEFT_OUT,
+    Accuracy, Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT,
+    MultipoleResult, ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult,
+    StateErrors, StateResult, Verdict, Verification, VerificationMesh, WHERE_LEFT_OUT,
 };
 use crate::printable::printable;
 
@@ -182,24 +182,7 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.push(("objective, best", format!("{best:.6e}{unit} at evaluation {best_evaluation}")));
     rows.push(("F/F0", styled(styles.strong, &super::ratio(*ratio))));
     rows.extend(homogeneity(objective));
-    let has_a_say = |found: &&Verification| !named.is_of_shape || !found.constraints.is_empty();
-    if let Some(found) = objective.verification.as_ref().filter(has_a_say) {
-        let [of_ratio, of_constraints] = match found.mesh {
-            VerificationMesh::Fresh => ["F/F0 on a fresh mesh", "constraints, fresh mesh"],
-            VerificationMesh::Cut => ["F/F0 on cut elements", "constraints, cut mesh"],
-        };
-        let (name, text) = if named.is_of_shape {
-            (of_constraints, constraints_text(found, styles))
-        } else if objective.is_violated_on_finer_mesh() {
-            (
-                of_ratio,
-                format!("{}, constraints {}", super::ratio(found.ratio), constraints_text(found, styles)),
-            )
-        } else {
-            (of_ratio, super::ratio(found.ratio))
-        };
-        rows.push((name, format!("{text} ({} tetrahedra)", found.tets)));
-    }
+    rows.extend(objective.verification.as_ref().and_then(|found| verification(found, named, styles)));
     let Some(accuracy) = &result.accuracy else { return rows };
     if let Some(error) = accuracy.error_estimate_relative {
         rows.push(("error bar of F/F0", format!("± {:.1e} (estimated)", SAFETY * error * ratio.abs())));
@@ -215,28 +198,47 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
             format!("{} ({elements}, order {order}{source})", super::ratio(*ratio)),
         ));
     }
-    rows.extend(accuracy.verdict.map(|verdict| {
-        let (style, small) = match verdict {
-            Verdict::Confirmed if accuracy.hides_gain(*ratio) => {
-                (styles.bad, ", but smaller than its error bar")
-            }
-            Verdict::Confirmed if objective.is_violated_on_finer_mesh() => {
-                (styles.bad, ", but of a shape that violates constraints on a finer mesh")
-            }
-            Verdict::Confirmed => (styles.good, ""),
-            Verdict::NotConfirmed => (styles.bad, ""),
-        };
-        let opinions = [
-            objective.verification.is_some(),
-            accuracy.cross_check.as_ref().is_some_and(|check| !check.by_estimate),
-            accuracy.error_estimate.is_some(),
-        ];
-        let alone = opinions.iter().filter(|is_there| **is_there).count() == 1;
-        let remark = if alone { " (by one check alone)" } else { "" };
-        let text = format!("{}{small}", verdict.describe());
-        ("gain", format!("{}{remark}", styled(style, &text)))
-    }));
+    rows.extend(accuracy.verdict.map(|verdict| gain(verdict, (objective, accuracy), styles)));
     rows
+}
+
+/// What the mesh of a check has to say, of the field or of constraints.
+fn verification(found: &Verification, named: &Named, styles: &Styles) -> Option<Row> {
+    if named.is_of_shape && found.constraints.is_empty() {
+        return None;
+    }
+    let [of_ratio, of_constraints] = match found.mesh {
+        VerificationMesh::Fresh => ["F/F0 on a fresh mesh", "constraints, fresh mesh"],
+        VerificationMesh::Cut => ["F/F0 on cut elements", "constraints, cut mesh"],
+    };
+    let constraints = constraints_text(found, styles);
+    let (name, text) = match super::ratio(found.ratio) {
+        _ if named.is_of_shape => (of_constraints, constraints),
+        ratio if found.violated().next().is_some() => {
+            (of_ratio, format!("{ratio}, constraints {constraints}"))
+        }
+        ratio => (of_ratio, ratio),
+    };
+    Some((name, format!("{text} ({} tetrahedra)", found.tets)))
+}
+
+/// Whether the gain is the shape's, and what is to be said of it.
+fn gain(verdict: Verdict, (objective, accuracy): (&ObjectiveResult, &Accuracy), styles: &Styles) -> Row {
+    let reservation = accuracy.reservation(objective);
+    let style = match (verdict, reservation) {
+        (Verdict::Confirmed, None) => styles.good,
+        _ => styles.bad,
+    };
+    let opinions = [
+        objective.verification.is_some(),
+        accuracy.cross_check.as_ref().is_some_and(|check| !check.by_estimate),
+        accuracy.error_estimate.is_some(),
+    ];
+    let alone = opinions.iter().filter(|is_there| **is_there).count() == 1;
+    let remark = if alone { " (by one check alone)" } else { "" };
+    let but = reservation.map_or(String::new(), |reservation| format!(", but {reservation}"));
+    let text = format!("{}{but}", verdict.describe());
+    ("gain", format!("{}{remark}", styled(style, &text)))
 }
 
 /// Whether the best shape keeps all constraints on the mesh of a check.
@@ -427,6 +429,24 @@ mod tests {
         ] {
             assert!(text.contains(fragment), "{fragment}\n{text}");
         }
+    }
+
+    #[test]
+    fn a_gain_is_confirmed_with_what_speaks_against_it() {
+        let mut result = crate::files::example_result();
+        let violated = ConstraintResult { satisfied: false, ..result.constraints[0].clone() };
+        let found = result.objective.as_mut().and_then(|own| own.verification.as_mut()).expect("a check");
+        found.constraints = vec![violated];
+        let of = |result: &RunResult| lines(result, &Named::default(), &Styles::default()).join("\n");
+        let text = of(&result);
+        for fragment in [
+            "0.50000, constraints VIOLATED: volume_plate (147000 tetrahedra)",
+            "confirmed: the gain is the shape's, but of a shape that violates constraints on the finer mesh",
+        ] {
+            assert!(text.contains(fragment), "{fragment}\n{text}");
+        }
+        result.accuracy.as_mut().expect("it is there").error_estimate_relative = Some(0.6);
+        assert!(of(&result).contains("but smaller than its error bar"), "{}", of(&result));
     }
 
     #[test]

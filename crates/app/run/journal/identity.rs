@@ -61,7 +61,7 @@ impl Identity {
                 short(&now.configuration)
             )
         } else if self.mesh != now.mesh {
-            other_mesh(&self.mesh, &now.mesh)
+            describe_meshes(&self.mesh, &now.mesh)
         } else if self.tables != now.tables {
             "it belongs to other B–H tables: a file that `bh_file` names has changed; restore it, manifest.json has its hash"
                 .to_owned()
@@ -74,7 +74,7 @@ impl Identity {
 }
 
 /// What there is to say of a run whose mesh is another now, by the hashes of both.
-pub fn other_mesh(was: &str, is: &str) -> String {
+pub fn describe_meshes(was: &str, is: &str) -> String {
     format!(
         "it belongs to another mesh (hash {}, now {}): restore the mesh file that the run was started with",
         short(was),

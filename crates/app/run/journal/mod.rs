@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::files::{OutputError, RunDirectory, SyncedLog};
 
 pub(super) use changed_key::changed_key;
-pub use identity::{Identity, configuration_hash, mesh_hash, other_mesh};
+pub use identity::{Identity, configuration_hash, describe_meshes, mesh_hash};
 
 /// Largest journal that is read [bytes]: four hundred thousand evaluations of a thousand variables.
 const LARGEST: u64 = 1 << 34;

@@ -101,11 +101,10 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
 
 /// Whether the gain is the shape's, with the error bar; `None` where nothing says so.
 fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
-    let verdict = match accuracy.verdict? {
-        Verdict::Confirmed if accuracy.hides_gain(objective.ratio) => "smaller than its error bar",
-        Verdict::Confirmed if objective.is_violated_on_finer_mesh() => "of a shape that violates constraints",
-        Verdict::Confirmed => "confirmed",
-        Verdict::NotConfirmed => "NOT CONFIRMED",
+    let verdict = match (accuracy.verdict?, accuracy.reservation(objective)) {
+        (Verdict::NotConfirmed, _) => "NOT CONFIRMED",
+        (Verdict::Confirmed, None) => "confirmed",
+        (Verdict::Confirmed, Some(reservation)) => reservation,
     };
     let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error * objective.ratio.abs());
     let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", ticks::ratio(objective.ratio), number(bar, 2)));

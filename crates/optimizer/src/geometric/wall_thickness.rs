@@ -1,13 +1,14 @@
 //! Wall thickness of the designed bodies behind every design node, measured along the node's direction of motion.
 //!
 //! From each node `x` of the design surface a ray runs against its direction `d` to where it leaves the body. On the
-//! undeformed mesh it meets a triangle with corners `y_k` there, at the weights `b_k`. On a moved mesh the thickness is how far
-//! the node is along its direction from that point of the body's surface, wherever it has moved,
+//! undeformed mesh it meets a triangle there with corners `y_k`, at the weights `b_k`, and with the normal `n`. On a moved mesh the
+//! thickness is the distance along `d` to the plane through that point of the body's surface, wherever it has moved, with the normal
+//! that it had,
 //!
-//! `t = d·(x − Σ b_k y_k) / d·d`, `∂t/∂x = d / d·d`, `∂t/∂y_k = −b_k d / d·d`:
+//! `t = n·(x − Σ b_k y_k) / (n·d)`, `∂t/∂x = n / (n·d)`, `∂t/∂y_k = −b_k n / (n·d)`:
 //!
-//! the initial one plus the node's height where that face is held. The plane of the triangle, which may turn by a right angle at a
-//! re-entrant edge, has no say in it. A node without direction has no thickness.
+//! the initial one plus the node's height where that face is held. The normal on the moved mesh, which at a re-entrant edge may turn
+//! by a right angle, has no say in it. A node without direction has no thickness.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
@@ -18,7 +19,8 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
 use crate::design::DesignSurface;
 
-/// Nodes at the rim of the body send their ray along its side: how far outside a triangle still hits.
+/// Nodes at the rim of the body send their ray along its side, and those at the edge of a step along that: how far outside a triangle
+/// still hits.
 const RIM_TOLERANCE: f64 = 1e-6;
 
 /// Sine of the angle (six degrees) between ray and triangle below which the triangle belongs to the body's side: facets of a
@@ -34,6 +36,8 @@ struct Opposite {
     nodes: [NodeId; 3],
     /// The weights of its nodes.
     weights: Point,
+    /// `n / (n·d)`: what the thickness grows by with the place of the design node.
+    growth: Point,
     /// The region between, of the mesh that was measured.
     body: RegionId,
 }
@@ -75,8 +79,9 @@ impl WallThickness {
             }
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
-                let (Hit { distance, weights }, nodes) = of[&body].nearest(origin, back)?;
-                Some(Some(Opposite { distance, nodes, weights, body }))
+                let (Hit { distance, weights, normal }, nodes) = of[&body].nearest(origin, back)?;
+                let growth = normal.map(|c| c / dot(normal, *direction));
+                Some(Some(Opposite { distance, nodes, weights, growth, body }))
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
             let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
@@ -118,10 +123,10 @@ impl WallThickness {
         surface: &'a DesignSurface,
         place: impl Fn(NodeId) -> Point + 'a,
     ) -> impl Iterator<Item = (usize, Wall)> + 'a {
-        self.opposite.iter().enumerate().filter_map(move |(i, opposite)| {
-            let Opposite { nodes, weights, .. } = (*opposite)?;
-            Some((i, wall((surface.nodes()[i], surface.directions()[i]), (nodes, weights), &place)))
-        })
+        self.opposite
+            .iter()
+            .enumerate()
+            .filter_map(move |(i, opposite)| Some((i, wall(surface.nodes()[i], &(*opposite)?, &place))))
     }
 
     /// Thickness [m] at every node of a moved mesh, shape `(n_nodes,)`; zero where none is measured.
@@ -157,18 +162,13 @@ impl WallThickness {
     }
 }
 
-/// The wall between a design node with its direction and the point of a triangle with these weights.
-fn wall(
-    (node, direction): (NodeId, Point),
-    (opposite, weights): ([NodeId; 3], Point),
-    place: &impl Fn(NodeId) -> Point,
-) -> Wall {
-    let along = direction.map(|c| c / dot(direction, direction));
-    let [a, b, c] = opposite;
+/// The wall between a design node and what lies opposite.
+fn wall(node: NodeId, opposite: &Opposite, place: &impl Fn(NodeId) -> Point) -> Wall {
+    let Opposite { nodes: [a, b, c], weights, growth, .. } = *opposite;
     let terms = [(node, 1.0), (a, -weights[0]), (b, -weights[1]), (c, -weights[2])];
     Wall {
-        thickness: terms.iter().map(|&(n, weight)| weight * dot(along, place(n))).sum(),
-        derivatives: terms.map(|(n, weight)| (n, along.map(|c| weight * c))),
+        thickness: terms.iter().map(|&(n, weight)| weight * dot(growth, place(n))).sum(),
+        derivatives: terms.map(|(n, weight)| (n, growth.map(|c| weight * c))),
     }
 }
 
@@ -193,6 +193,7 @@ pub fn faces_with_bodies(mesh: &Mesh, surface: &DesignSurface) -> Vec<([NodeId; 
 
 /// The faces of a body, found by rays.
 struct BodyFaces {
+    /// Seen from outside.
     nodes: Vec<[NodeId; 3]>,
     corners: Vec<[Point; 3]>,
     tree: BoxTree,
@@ -205,7 +206,11 @@ impl BodyFaces {
         let topology = mesh.topology();
         let is_own = |e: ElementId| topology.region_of()[e.index()] == region;
         let own = topology.facets().iter().filter(|f| is_own(f.inside) != f.outside.is_some_and(is_own));
-        let nodes: Vec<[NodeId; 3]> = own.map(|f| f.nodes).collect();
+        let outwards = |facet: &Facet| match facet.nodes {
+            nodes if is_own(facet.inside) => nodes,
+            [a, b, c] => [a, c, b],
+        };
+        let nodes: Vec<[NodeId; 3]> = own.map(outwards).collect();
         let is_designed = |face: &&[NodeId; 3]| face.iter().all(|n| surface.nodes().binary_search(n).is_ok());
         let designed_nodes = nodes.iter().filter(is_designed).flatten().copied().collect();
         let corners: Vec<[Point; 3]> = nodes.iter().map(|f| f.map(|n| mesh.point(n))).collect();
@@ -217,17 +222,26 @@ impl BodyFaces {
         self.designed_nodes.contains(&node)
     }
 
-    /// The nearest face that a ray meets; one that it runs along, if there is no other.
+    /// The nearest face that a ray goes out through; one that it runs along, if there is no other.
     fn nearest(&self, origin: Point, direction: Point) -> Option<(Hit, [NodeId; 3])> {
         let hits = self.tree.hits(origin, direction);
-        // From a rim the ray runs along the facets of the body's side, and a round side is no plane.
-        let across = |i: &usize| !runs_along(direction, &self.corners[*i]);
+        // From a rim the ray runs along the facets of the body's side, and a round side is no plane; at the foot of a step it meets
+        // the rim of a face that it does not go through.
+        let goes_out = |i: &usize| {
+            let corners = &self.corners[*i];
+            dot(area_vector(*corners), direction) > 0.0 && !runs_along(direction, corners)
+        };
         let nearest = |of: &mut dyn Iterator<Item = usize>| {
             let met = of.filter_map(|i| Some((hit(origin, direction, &self.corners[i])?, i)));
             met.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance))
         };
-        let found = nearest(&mut hits.iter().copied().filter(across));
-        let (hit, i) = found.or_else(|| nearest(&mut hits.iter().copied()))?;
+        let found = nearest(&mut hits.iter().copied().filter(goes_out));
+        let along = || {
+            let (hit, i) = nearest(&mut hits.iter().copied())?;
+            // Of a face beside it, the distance to its point.
+            Some((Hit { normal: direction, ..hit }, i))
+        };
+        let (hit, i) = found.or_else(along)?;
         Some((hit, self.nodes[i]))
     }
 }
@@ -238,6 +252,8 @@ struct Hit {
     distance: f64,
     /// The weights of the corners.
     weights: Point,
+    /// That of the triangle, of any length.
+    normal: Point,
 }
 
 /// Whether a ray runs along a triangle rather than through it.
@@ -264,7 +280,7 @@ fn hit(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<Hit> {
     let met: Point = std::array::from_fn(|d| origin[d] + distance * direction[d]);
     let weights = barycentric(triangle, met);
     let is_inside = weights.into_iter().all(|share| share >= -RIM_TOLERANCE);
-    (is_inside && distance > RIM_TOLERANCE * area.sqrt()).then_some(Hit { distance, weights })
+    (is_inside && distance > RIM_TOLERANCE * area.sqrt()).then_some(Hit { distance, weights, normal })
 }
 
 /// Barycentric coordinates of a point in the plane of a triangle, by sub-areas.
@@ -380,13 +396,66 @@ mod tests {
         assert!(thickness.at_nodes().all(|(_, t)| (t - 0.1).abs() < 1e-12));
     }
 
+    /// A high plate on a wide one, both tops designed: rays at the edge of the step run along its side, past the wide plate's top.
     #[test]
-    fn a_wall_has_its_derivative_in_all_four_nodes() {
+    fn a_wall_does_not_end_at_the_foot_of_a_step() {
+        let part = |low: Point, high: Point| BoxRegion {
+            name: "plate".to_owned(),
+            corners: [low, high],
+            size: [0.25; 3],
+            skin: [f64::INFINITY; 3],
+            cells: None,
+        };
+        let mesh = boxes(&BoxesParameters {
+            corners: [[-0.5, -0.5, -0.5], [1.5, 1.5, 1.0]],
+            regions: vec![part([0.0, 0.0, 0.0], [1.0, 1.0, 0.2]), part([0.25, 0.25, 0.2], [0.75, 0.75, 0.3])],
+            sizes: vec![],
+            surfaces: vec![],
+            growth: 2.0,
+            refinement: 1.0,
+            division: None,
+        })
+        .expect("two plates");
+        for designed in [&[0.2, 0.3][..], &[0.3]] {
+            let surface = faces_at(&mesh, designed, Direction::Along([0.0, 0.0, 1.0]));
+            let plate = mesh.topology().region("plate").expect("it is there");
+            let thickness = WallThickness::measure(&mesh, &[plate], &surface).expect("it has a lower face");
+            for (i, t) in thickness.at_nodes() {
+                let height = mesh.point(surface.nodes()[i])[2];
+                assert!((t - height).abs() < 1e-12, "{designed:?}: {t} at {height}");
+            }
+        }
+    }
+
+    /// The wall behind a node that moves along z over a plane, which leans by as much as it likes.
+    #[test]
+    fn a_plane_that_leans_and_moves_along_its_normal_is_as_far_as_along_the_ray() {
+        let slope = 0.7_f64;
+        let corners = [[-1.0, -1.0, -slope], [1.0, -1.0, slope], [0.0, 2.0, 0.0]];
+        let (origin, direction) = ([0.1, 0.2, 1.5], [0.0, 0.0, 1.0]);
+        let Hit { distance, weights, normal } =
+            hit(origin, [0.0, 0.0, -1.0], &corners).expect("it lies below");
+        assert!((distance - (1.5 - 0.1 * slope)).abs() < 1e-15, "{distance}");
+        let growth = normal.map(|c| c / dot(normal, direction));
+        let nodes = [1, 2, 3].map(NodeId);
+        let opposite = Opposite { distance, nodes, weights, growth, body: RegionId(0) };
+        let unit = normal.map(|c| c / norm(normal));
+        let moved = |n: NodeId| match n.index() {
+            0 => origin,
+            k => std::array::from_fn(|d| corners[k - 1][d] - 0.3 * unit[d] * unit[2].signum()),
+        };
+        let thickness = wall(NodeId(0), &opposite, &moved).thickness;
+        let expected = distance + 0.3 * (1.0 + slope * slope).sqrt();
+        assert!((thickness - expected).abs() < 1e-14, "{thickness} {expected}");
+    }
+
+    #[test]
+    fn a_wall_has_its_derivative_in_all_four_nodes_and_none_by_the_turn_of_a_triangle() {
         let places = [[0.2, 0.1, 1.1], [-0.4, -0.3, 0.1], [1.2, -0.1, 0.2], [0.1, 1.3, -0.1]];
-        let direction = [0.1, -0.2, 0.97];
-        let [node, opposite @ ..] = [0, 1, 2, 3].map(NodeId);
-        let weights = [0.5, 0.2, 0.3];
-        let at = |places: &[Point; 4]| wall((node, direction), (opposite, weights), &|n| places[n.index()]);
+        let growth = [0.1, -0.2, 1.1];
+        let nodes = [1, 2, 3].map(NodeId);
+        let opposite = Opposite { distance: 1.0, nodes, weights: [0.5, 0.2, 0.3], growth, body: RegionId(0) };
+        let at = |places: &[Point; 4]| wall(NodeId(0), &opposite, &|n| places[n.index()]);
         for (k, (own, derivative)) in at(&places).derivatives.into_iter().enumerate() {
             assert_eq!(own, NodeId::new(k));
             for d in 0..3 {
@@ -395,13 +464,17 @@ mod tests {
                     moved[k][d] += h;
                     at(&moved).thickness
                 };
-                // Lengths of one: truncation 1e-8, rounding 1e-16 over 1e-4.
-                let difference = (shifted(1e-4) - shifted(-1e-4)) / 2e-4;
-                assert!((derivative[d] - difference).abs() < 1e-7, "{k} {d}: {} {difference}", derivative[d]);
+                // It is linear: rounding of numbers of order one over a step of one.
+                let difference = (shifted(0.5) - shifted(-0.5)) / 1.0;
+                assert!(
+                    (derivative[d] - difference).abs() < 1e-14,
+                    "{k} {d}: {} {difference}",
+                    derivative[d]
+                );
             }
         }
-        // Corners that move across the direction turn the triangle, here until it is seen edgewise.
-        let across = [0.97, 0.0, -0.1];
+        // Across the plane that the triangle had, until it is seen from behind.
+        let across = [0.0, 1.1, 0.2];
         let mut turned = places;
         turned[1] = std::array::from_fn(|d| places[1][d] + 20.0 * across[d]);
         let [was, is] = [places, turned].map(|places| at(&places).thickness);

@@ -78,7 +78,8 @@ impl Cut {
             (
                 "there is no room between the design surface and where the mesh is held".to_owned(),
                 "narrower bounds give it, a larger remesh region where it ends inside the mesh, or a surface that is \
-                 let go within it: the interfaces of regions are held where nothing else is said",
+                 let go within it: the interfaces of regions and the outside, symmetry planes as well, are held where nothing else \
+                 is said",
             )
         };
         let [x, y, z] = centroid(mesh.vertices(element)).map(|c| 1e3 * c);
