@@ -6,7 +6,7 @@ use maud::{Markup, html};
 use super::colour::ColourMap;
 use super::data::RunData;
 use super::frame::Frame;
-use super::plane::{Plane, extremes, images, mirrored, mirrors};
+use super::plane::{Plane, extremes, images, mirrored, mirrors, with_room};
 use super::plot::{LEFT, RIGHT, Scale, WIDTH, axes, colour_bar, dot, line, svg, text};
 use super::ticks::{Count, number, trim_zeros};
 use super::words::capital;
@@ -57,8 +57,7 @@ impl SurfaceValues {
             let most = low.abs().max(high.abs()).max(1e-9);
             return Some([-most, most]);
         }
-        let room = if high - low < 1e-9 * high.abs().max(1e-6) { 0.1 * high.abs().max(1e-3) } else { 0.0 };
-        Some([low - room, high + room])
+        Some(with_room([low, high]))
     }
 
     fn is_signed(&self) -> bool {
@@ -81,6 +80,10 @@ pub(super) fn figure(data: &RunData, outline: &Outline, design: &OutlinedDesign)
     let surface = SurfaceValues::new(data, design);
     let after = surface.values[1].as_ref().ok_or("the best design is not known, or not one of this mesh")?;
     let [low, high] = surface.range().ok_or("no node of the design surface has a value")?;
+    if surface.is_signed() && surface.values.iter().flatten().flatten().flatten().all(|height| *height == 0.0)
+    {
+        return Err("nothing has moved".to_owned());
+    }
     let scale = Scale { low, high, count: Count::Linear, pixels: [LEFT, WIDTH - RIGHT] };
     let drawing = Drawing::new(data, outline, design, scale);
     let names = if data.is_run() { ["before", "after"] } else { ["undeformed", "the design analysed"] };

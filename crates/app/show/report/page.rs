@@ -176,8 +176,8 @@ fn caption(data: &RunData, surface: &Surface) -> String {
     if surface.exaggeration > 1.0 {
         text += &format!("The motion is drawn {} times as large. ", trim_zeros(surface.exaggeration, 0));
     }
-    text += "Drag to turn, wheel or two fingers to zoom, arrow keys when selected; the slider goes from the initial shape \
-             to the best one.";
+    text += "Drag to turn, wheel or two fingers to zoom, arrow keys when selected";
+    text += if surface.moves { "; the slider goes from the initial shape to the best one." } else { "." };
     if data.fields[1].is_ok() {
         text += " |B| is that of the body where it is meshed, else that of the air at its surface.";
     }

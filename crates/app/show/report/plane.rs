@@ -85,6 +85,12 @@ pub(super) fn extremes(values: impl IntoIterator<Item = f64>) -> [f64; 2] {
     values.into_iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
 }
 
+/// A range of values; one that only rounding makes wider than a point with a tenth of the value on both sides.
+pub(super) fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
+    let room = if high - low < 1e-9 * high.abs().max(1e-6) { 0.1 * high.abs().max(1e-3) } else { 0.0 };
+    [low - room, high + room]
+}
+
 /// Lower and upper corner around points.
 pub(super) fn bounds(points: impl IntoIterator<Item = Point>) -> [Point; 2] {
     points.into_iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {

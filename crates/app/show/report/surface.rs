@@ -13,7 +13,7 @@ use super::colour::ColourMap;
 use super::cut::NodeMeans;
 use super::data::{RunData, Snapshot};
 use super::map::{SurfaceValues, view_normal};
-use super::plane::{bounds, extremes, mirrors};
+use super::plane::{bounds, extremes, mirrors, with_room};
 use super::ticks::Count;
 use crate::build::{Outline, OutlinedDesign};
 
@@ -33,6 +33,8 @@ pub(super) struct Surface {
     pub(super) what: String,
     /// How many times the motion is drawn.
     pub(super) exaggeration: f64,
+    /// Whether it is another one after than before.
+    pub(super) moves: bool,
 }
 
 /// Values at the nodes before and after.
@@ -81,7 +83,8 @@ impl Surface {
         let exaggeration = enlargement(farthest, span(&places[0]));
         let colourings = colourings(data, outline, design, &nodes, &places);
         let json = pack(data, design, (&nodes, &triangles), &places, &colourings, exaggeration);
-        Ok(Self { json, triangles: triangles.len(), what, exaggeration })
+        let moves = places[0] != places[1];
+        Ok(Self { json, triangles: triangles.len(), what, exaggeration, moves })
     }
 }
 
@@ -175,13 +178,16 @@ fn colourings(
         let of = |(a, b): (&Point, &Point)| Some(1e3 * norm(std::array::from_fn(|d| b[d] - a[d])));
         undeformed.iter().zip(points).map(of).collect()
     };
-    all.push(Colouring {
-        name: "displacement".to_owned(),
-        unit: "mm",
-        map: ColourMap::Length,
-        count: Count::Linear,
-        values: places.each_ref().map(motion),
-    });
+    let values = places.each_ref().map(motion);
+    if values.iter().flatten().flatten().any(|length| *length > 0.0) {
+        all.push(Colouring {
+            name: "displacement".to_owned(),
+            unit: "mm",
+            map: ColourMap::Length,
+            count: Count::Linear,
+            values,
+        });
+    }
     if let Ok(after) = &data.fields[1] {
         let before = data.fields[0].as_ref().ok();
         let of = |field: &Snapshot| flux_density(outline, design, nodes, field);
@@ -265,6 +271,7 @@ impl Colouring {
         if !(least.is_finite() && most.is_finite()) {
             return None;
         }
+        let [least, most] = with_room([least, most]);
         let logarithmic = self.count == Count::Logarithmic && most > 0.0 && least < most / 30.0;
         let [low, high] = if logarithmic { [least.max(1e-4 * most), most] } else { [least.min(most), most] };
         let form = |v: f64| if logarithmic { v.max(low).ln() } else { v };

@@ -314,6 +314,7 @@
     input.addEventListener("input", () => { stop(); state.shape = Number(input.value); redraw(); });
   });
   slider.parentNode.append("best");
+  slider.parentNode.hidden = data.before === data.after;
   let playing = 0;
   function stop() { cancelAnimationFrame(playing); playing = 0; }
   const play = document.createElement("button");
@@ -331,6 +332,7 @@
     };
     playing = requestAnimationFrame(step);
   });
+  play.hidden = data.before === data.after;
   controls.append(play);
   control("Mesh lines", "input", (input) => {
     Object.assign(input, { type: "checkbox", checked: state.lines });

@@ -13,7 +13,7 @@ pub use wall_thickness::{Wall, WallThickness, faces_with_bodies};
 #[derive(Debug, thiserror::Error)]
 #[error(
     "the thickness along the design's direction is not defined: there is no body behind the design surface, or some \
-     line through it meets no opposite face; name no faces of a body but those that are shaped, give the body a material, or leave the \
-     thickness limit out"
+     line through it meets no opposite face; turn a direction round that points into the body, name no faces of a body but those that are \
+     shaped, give the body a material, or leave the thickness limit out"
 )]
 pub struct NoThickness;

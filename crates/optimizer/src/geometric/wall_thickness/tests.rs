@@ -1,0 +1,194 @@
+use super::*;
+use crate::design::{DesignSetup, Direction};
+use fluxmorph_geometry::generate::{BoxRegion, BoxesParameters, ShieldParameters, boxes, shield};
+
+#[test]
+fn the_plate_is_ten_millimetres_thick_at_every_node() {
+    let parameters = ShieldParameters { refinement: 0.5, ..ShieldParameters::default() };
+    let mesh = shield(&parameters).expect("defaults are valid");
+    let triangles = mesh.topology().surface("plate_bottom").expect("the shield has it");
+    let surface = DesignSurface::new(&mesh, &DesignSetup::new(triangles, Direction::Along([0.0, 0.0, -1.0])))
+        .expect("every node is a variable");
+    let plate = mesh.topology().region("plate").expect("the shield has it");
+    let thickness = WallThickness::measure(&mesh, &[plate], &surface).expect("a plate has two faces");
+    assert!(thickness.at_nodes().all(|(_, t)| (t - 0.010).abs() < 1e-12));
+    let held = |n: NodeId| {
+        let [x, y, z] = mesh.point(n);
+        let moves = surface.nodes().binary_search(&n).is_ok();
+        [x, y, if moves { z - 0.001 } else { z }]
+    };
+    let thick: Vec<f64> = thickness.walls(&surface, held).map(|(_, wall)| wall.thickness).collect();
+    assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
+}
+
+/// Layers between these heights with air below and above.
+fn layers(heights: &[(&str, [f64; 2])]) -> Mesh {
+    let layer = |(name, [from, to]): &(&str, [f64; 2])| BoxRegion {
+        name: (*name).to_owned(),
+        corners: [[0.0, 0.0, *from], [1.0, 1.0, *to]],
+        size: [0.5; 3],
+        skin: [f64::INFINITY; 3],
+        cells: None,
+    };
+    boxes(&BoxesParameters {
+        corners: [[0.0, 0.0, -0.5], [1.0, 1.0, 1.7]],
+        regions: heights.iter().map(layer).collect(),
+        sizes: vec![],
+        surfaces: vec![],
+        growth: 2.0,
+        refinement: 1.0,
+        division: None,
+    })
+    .expect("layers")
+}
+
+/// The faces at some heights as the design.
+fn faces_at(mesh: &Mesh, heights: &[f64], direction: Direction) -> DesignSurface {
+    let is_designed = |face: &[NodeId; 3]| {
+        let at = |z: &f64| face.iter().all(|n| (mesh.point(*n)[2] - z).abs() < 1e-12);
+        heights.iter().any(at)
+    };
+    // The first looks down.
+    let turned = |[a, b, c]: [NodeId; 3]| {
+        let looks_down = area_vector([a, b, c].map(|n| mesh.point(n)))[2] < 0.0;
+        let is_first = (mesh.point(a)[2] - heights[0]).abs() < 1e-12;
+        if looks_down == is_first { [a, b, c] } else { [a, c, b] }
+    };
+    let all = mesh.topology().facets().iter().map(|facet| facet.nodes);
+    let faces: Vec<[NodeId; 3]> = all.filter(is_designed).map(turned).collect();
+    DesignSurface::new(mesh, &DesignSetup::new(&faces, direction)).expect("every node is a variable")
+}
+
+/// Plates one behind the other and touching ones, whichever region comes first: what lies behind a face is its own body.
+#[test]
+fn every_body_has_its_own_thickness() {
+    let (apart, touching) = ([[0.0, 0.1], [1.0, 1.2]], [[0.0, 0.1], [0.1, 0.3]]);
+    for (ends, direction) in [(apart, -1.0), (apart, 1.0), (touching, -1.0), (touching, 1.0)] {
+        for names in [["thin", "thick"], ["thick", "thin"]] {
+            let mut heights = [("thin", ends[0]), ("thick", ends[1])];
+            heights.sort_by_key(|(name, _)| *name != names[0]);
+            let mesh = layers(&heights);
+            let designed = usize::from(direction > 0.0);
+            let places = heights.map(|(_, ends)| ends[designed]);
+            let surface = faces_at(&mesh, &places, Direction::Along([0.0, 0.0, direction]));
+            let regions = names.map(|name| mesh.topology().region(name).expect("it has both"));
+            let thickness = WallThickness::measure(&mesh, &regions, &surface).expect("both have two faces");
+            for (i, t) in thickness.at_nodes() {
+                let is_thin = (mesh.point(surface.nodes()[i])[2] - ends[0][designed]).abs() < 1e-9;
+                let expected = if is_thin { 0.1 } else { 0.2 };
+                assert!((t - expected).abs() < 1e-12, "{ends:?} {direction} {names:?}: {t} {expected}");
+            }
+            assert_eq!(thickness.at_nodes().count(), surface.nodes().len());
+            let least = thickness.least_of_bodies(&surface, |n| mesh.point(n));
+            let of = |name: &str| least[&mesh.topology().region(name).expect("it has both")];
+            assert!((of("thin") - 0.1).abs() < 1e-12 && (of("thick") - 0.2).abs() < 1e-12);
+            assert!(WallThickness::measure(&mesh, &[], &surface).is_none());
+        }
+    }
+}
+
+/// A leg with both faces designed beside another one that is held: its own other face is nearer than the other leg.
+#[test]
+fn a_wall_ends_where_its_body_does_first() {
+    let mesh = layers(&[("legs", [0.0, 0.1]), ("legs", [1.0, 1.2])]);
+    let surface = faces_at(&mesh, &[0.0, 0.1], Direction::Normal);
+    let legs = mesh.topology().region("legs").expect("it has them");
+    let thickness = WallThickness::measure(&mesh, &[legs], &surface).expect("it has two faces");
+    assert_eq!(thickness.at_nodes().count(), surface.nodes().len());
+    assert!(thickness.at_nodes().all(|(_, t)| (t - 0.1).abs() < 1e-12));
+}
+
+/// Half a degree off the normal, as the mean of a few facets of a round face may be: at one side rays lead past the plate.
+#[test]
+fn a_ray_that_misses_the_body_at_a_rim_costs_no_other_node_its_thickness() {
+    let mesh = layers(&[("plate", [0.0, 0.1])]);
+    let angle = 0.5_f64.to_radians();
+    let surface = faces_at(&mesh, &[0.1], Direction::Along([angle.sin(), 0.0, angle.cos()]));
+    let plate = mesh.topology().region("plate").expect("it is there");
+    let thickness = WallThickness::measure(&mesh, &[plate], &surface).expect("most rays meet it");
+    let inner = surface.nodes().iter().filter(|n| mesh.point(**n)[0] > 0.0).count();
+    assert!(inner < surface.nodes().len());
+    assert_eq!(thickness.at_nodes().count(), inner);
+    assert!(thickness.at_nodes().all(|(_, t)| (t - 0.1 / angle.cos()).abs() < 1e-12));
+}
+
+/// A high plate on a wide one, both tops designed: rays at the edge of the step run along its side, past the wide plate's top.
+#[test]
+fn a_wall_does_not_end_at_the_foot_of_a_step() {
+    let part = |low: Point, high: Point| BoxRegion {
+        name: "plate".to_owned(),
+        corners: [low, high],
+        size: [0.25; 3],
+        skin: [f64::INFINITY; 3],
+        cells: None,
+    };
+    let mesh = boxes(&BoxesParameters {
+        corners: [[-0.5, -0.5, -0.5], [1.5, 1.5, 1.0]],
+        regions: vec![part([0.0, 0.0, 0.0], [1.0, 1.0, 0.2]), part([0.25, 0.25, 0.2], [0.75, 0.75, 0.3])],
+        sizes: vec![],
+        surfaces: vec![],
+        growth: 2.0,
+        refinement: 1.0,
+        division: None,
+    })
+    .expect("two plates");
+    for designed in [&[0.2, 0.3][..], &[0.3]] {
+        let surface = faces_at(&mesh, designed, Direction::Along([0.0, 0.0, 1.0]));
+        let plate = mesh.topology().region("plate").expect("it is there");
+        let thickness = WallThickness::measure(&mesh, &[plate], &surface).expect("it has a lower face");
+        for (i, t) in thickness.at_nodes() {
+            let height = mesh.point(surface.nodes()[i])[2];
+            assert!((t - height).abs() < 1e-12, "{designed:?}: {t} at {height}");
+        }
+    }
+}
+
+/// The wall behind a node that moves along z over a plane, which leans by as much as it likes.
+#[test]
+fn a_plane_that_leans_and_moves_along_its_normal_is_as_far_as_along_the_ray() {
+    let slope = 0.7_f64;
+    let corners = [[-1.0, -1.0, -slope], [1.0, -1.0, slope], [0.0, 2.0, 0.0]];
+    let (origin, direction) = ([0.1, 0.2, 1.5], [0.0, 0.0, 1.0]);
+    let Hit { distance, weights, normal } = hit(origin, [0.0, 0.0, -1.0], &corners).expect("it lies below");
+    assert!((distance - (1.5 - 0.1 * slope)).abs() < 1e-15, "{distance}");
+    let growth = normal.map(|c| c / dot(normal, direction));
+    let nodes = [1, 2, 3].map(NodeId);
+    let opposite = Opposite { distance, nodes, weights, growth, body: RegionId(0) };
+    let unit = normal.map(|c| c / norm(normal));
+    let moved = |n: NodeId| match n.index() {
+        0 => origin,
+        k => std::array::from_fn(|d| corners[k - 1][d] - 0.3 * unit[d] * unit[2].signum()),
+    };
+    let thickness = wall(NodeId(0), &opposite, &moved).thickness;
+    let expected = distance + 0.3 * (1.0 + slope * slope).sqrt();
+    assert!((thickness - expected).abs() < 1e-14, "{thickness} {expected}");
+}
+
+#[test]
+fn a_wall_has_its_derivative_in_all_four_nodes_and_none_by_the_turn_of_a_triangle() {
+    let places = [[0.2, 0.1, 1.1], [-0.4, -0.3, 0.1], [1.2, -0.1, 0.2], [0.1, 1.3, -0.1]];
+    let growth = [0.1, -0.2, 1.1];
+    let nodes = [1, 2, 3].map(NodeId);
+    let opposite = Opposite { distance: 1.0, nodes, weights: [0.5, 0.2, 0.3], growth, body: RegionId(0) };
+    let at = |places: &[Point; 4]| wall(NodeId(0), &opposite, &|n| places[n.index()]);
+    for (k, (own, derivative)) in at(&places).derivatives.into_iter().enumerate() {
+        assert_eq!(own, NodeId::new(k));
+        for d in 0..3 {
+            let shifted = |h: f64| {
+                let mut moved = places;
+                moved[k][d] += h;
+                at(&moved).thickness
+            };
+            // It is linear: rounding of numbers of order one over a step of one.
+            let difference = (shifted(0.5) - shifted(-0.5)) / 1.0;
+            assert!((derivative[d] - difference).abs() < 1e-14, "{k} {d}: {} {difference}", derivative[d]);
+        }
+    }
+    // Across the plane that the triangle had, until it is seen from behind.
+    let across = [0.0, 1.1, 0.2];
+    let mut turned = places;
+    turned[1] = std::array::from_fn(|d| places[1][d] + 20.0 * across[d]);
+    let [was, is] = [places, turned].map(|places| at(&places).thickness);
+    // One rounding of numbers of order 20.
+    assert!((was - is).abs() < 1e-14, "{was} {is}");
+}
