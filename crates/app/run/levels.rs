@@ -18,9 +18,9 @@ use fluxmorph_optimizer::driver::{Observer, Standing, StopReason, Supervisor};
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Problem};
 
-use super::Session;
 use super::estimate::Estimator;
 use super::journal::mesh_hash;
+use super::{Session, timed};
 use crate::build::{Mode, RefinedMesh, Setup, memory_limit, remaining_elements, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
@@ -302,9 +302,9 @@ impl Supervisor for Levels<'_> {
 impl Levels<'_> {
     /// Does a part of the work of refining, and adds its time.
     pub(super) fn timed<T>(&mut self, work: impl FnOnce(&mut Self) -> T) -> T {
-        let clock = Instant::now();
-        let done = work(self);
-        self.seconds += clock.elapsed().as_secs_f64();
+        let mut seconds = 0.0;
+        let done = timed(&mut seconds, || work(self));
+        self.seconds += seconds;
         done
     }
 

@@ -81,6 +81,9 @@ pub(super) struct Summary<'a> {
     pub(super) constraints: &'a [Constraint],
     /// Volumes [m³] and masses [kg] of the initial design that are constrained, by the names of the constraints.
     pub(super) constrained_bodies: BTreeMap<String, f64>,
+    /// Least and greatest thickness [m] of the initial design, where that is constrained.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) constrained_thickness_m: Option<[f64; 2]>,
     pub(super) design: Option<&'a Design>,
     /// Whether the mesh follows all variables to their bounds.
     pub(super) reach: Vec<Reach>,
@@ -247,6 +250,7 @@ pub(super) fn summary<'a>(
         objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,
         constrained_bodies: constrained_bodies(problem)?,
+        constrained_thickness_m: constrained_thickness(problem)?,
         design: config.design.as_ref(),
         reach: Reach::of(problem),
         remesh: config.remesh.as_ref(),
@@ -271,6 +275,18 @@ fn constrained_bodies(problem: &Problem) -> Result<BTreeMap<String, f64>, Error>
         Ok(found.map(|(value, _)| (own.name.clone(), value)))
     };
     bodies.filter_map(|own| value(own).transpose()).collect()
+}
+
+/// The range of a constrained thickness initially.
+fn constrained_thickness(problem: &Problem) -> Result<Option<[f64; 2]>, Error> {
+    let is_wall = |own: &constraint::Constraint| matches!(own.quantity, Quantity::Thickness { .. });
+    let shape = problem.shape().filter(|_| problem.constraints().iter().any(is_wall));
+    let Some((shape, thickness)) = shape.and_then(|shape| Some((shape, shape.thickness()?))) else {
+        return Ok(None);
+    };
+    let moved = problem.moved(shape.initial()).map_err(OptimizerError::from)?;
+    let (least, most) = thickness.range(shape.surface(), &moved.mesh);
+    Ok(Some([least, most]))
 }
 
 impl MeshFileSummary {

@@ -140,7 +140,7 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     row("linear solver", summary.linear_solvers.join(", "));
     row("objective", objective(summary));
     for constraint in summary.constraints {
-        row("constraint", bound_of(constraint, summary.constrained_bodies.get(&constraint.name)));
+        row("constraint", format!("{}{}", bound_of(constraint), initially(constraint, summary)));
     }
     if !summary.probes.is_empty() {
         let probe = |p: &crate::config::Probe| format!("{} ({})", p.name, p.points.len());
@@ -228,8 +228,22 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
     }
 }
 
+/// What a constraint of the shape is measured by has at the initial design, behind its bound.
+fn initially(constraint: &Constraint, summary: &Summary<'_>) -> String {
+    let text = match constraint.limit {
+        Limit::Thickness { .. } => summary
+            .constrained_thickness_m
+            .map(|[least, most]| format!("{:.3} to {:.3} mm", Millimetres(least), Millimetres(most))),
+        Limit::Functional { .. } => summary
+            .constrained_bodies
+            .get(&constraint.name)
+            .map(|value| format!("{value:.4e}{}", constraint.limit.dimension().behind_value())),
+    };
+    text.map_or(String::new(), |text| format!(", {text} initially"))
+}
+
 /// A constraint in words.
-fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
+fn bound_of(constraint: &Constraint) -> String {
     let unit = constraint.limit.dimension().behind_value();
     let value = |bound: &ValueBound| match bound {
         ValueBound::AtMost(upper) => format!("at most {upper:e}{unit}"),
@@ -246,8 +260,7 @@ fn bound_of(constraint: &Constraint, initial: Option<&f64>) -> String {
             sides.into_iter().flatten().collect::<Vec<_>>().join(", ")
         }
     };
-    let initial = initial.map_or(String::new(), |value| format!(", {value:.4e}{unit} initially"));
-    format!("{} {bounds}{initial}", constraint.name)
+    format!("{} {bounds}", constraint.name)
 }
 
 fn region_table(summary: &Summary<'_>) -> Table<5> {
