@@ -15,7 +15,7 @@ use fluxmorph_geometry::{Mesh, MeshError, NodeId, RegionId, Topology};
 use fluxmorph_optimizer::design::DesignSurface;
 
 use super::open;
-use super::references::surface_names;
+use super::references::{is_condition, surface_names};
 use crate::config::{Config, ConfigError, Diagnostic, Document, LengthUnit, MeshConfig, SourceMap, Span};
 use crate::error::Error;
 use crate::files::OutputError;
@@ -167,8 +167,7 @@ pub(super) fn surface_faults(config: &Config, source: &SourceMap, topology: &Top
 /// How to name the faces of a region, by the region on their other side; of a condition those at the outside alone.
 fn faces_of_region(topology: &Topology, name: &str, path: &str) -> Vec<String> {
     let Ok(own) = topology.region(name) else { return Vec::new() };
-    let is_condition = path.starts_with("boundaries.");
-    let touches = |k: &usize| !is_condition && !topology.interface(own, RegionId::new(*k)).is_empty();
+    let touches = |k: &usize| !is_condition(path) && !topology.interface(own, RegionId::new(*k)).is_empty();
     let others = topology.region_names();
     let inside = (0..others.len()).filter(touches).map(|k| others[k].as_str());
     let outside = Some(OUTSIDE).filter(|_| !topology.outer_faces(own).is_empty());
@@ -181,7 +180,7 @@ pub(super) fn inner_faults(config: &Config, source: &SourceMap, topology: &Topol
         topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
     surface_names(config)
         .into_iter()
-        .filter(|(path, _)| path.starts_with("boundaries."))
+        .filter(|(path, _)| is_condition(path))
         .filter(|(_, name)| {
             topology.surface(name).is_ok_and(|s| s.iter().any(|t| !outer.contains(&face_key(*t))))
         })

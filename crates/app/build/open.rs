@@ -5,7 +5,7 @@ use fluxmorph_geometry::topology::Topology;
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_solver::{Boundary, OpenRegion};
 
-use super::references::{functionals, surface_names};
+use super::references::{functionals, is_condition, surface_names};
 use crate::config::{Config, Diagnostic, ObjectiveKind, Open, SourceMap};
 use crate::error::Error;
 
@@ -71,7 +71,7 @@ pub(super) fn condition(config: &Config) -> Option<(String, Boundary)> {
 pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     let Some(open) = &config.open else { return Vec::new() };
     let twice = |(path, name): (String, &str)| {
-        let is_open = path.starts_with("boundaries.") && open.surfaces().iter().any(|own| own == name);
+        let is_open = is_condition(&path) && open.surfaces().iter().any(|own| own == name);
         is_open.then(|| {
             source
                 .diagnostic(&path, format!("`{name}` has a condition, but space is open beyond it"))

@@ -7,14 +7,14 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use fluxmorph_geometry::soundness::OpenPatch;
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
 use super::references::functionals;
-use super::soundness::{faces_of, faces_without_condition};
+use super::soundness::{faces_of, faces_without_condition, size};
 use super::thin_windings::{self, section};
 use crate::config::{
     Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, LoadCase, MeshConfig,
@@ -418,11 +418,6 @@ pub(super) fn unit_hint(config: &Config, mesh: &Mesh) -> Option<String> {
         _ => "the units of the mesh and of the coil",
     };
     Some(format!("the coil `{coil}` is {width:.4} m wide and the mesh {size:.4} m: check {unit}"))
-}
-
-fn size(mesh: &Mesh) -> f64 {
-    let [low, high] = mesh.bounding_box();
-    norm(sub(high, low))
 }
 
 /// Half sizes of the box around an analytic coil, across its axis and along it [m].

@@ -3,6 +3,11 @@
 
 use crate::config::{self, CoilPath, CoilShape, Config, Target};
 
+/// Whether the path of a key is that of a condition on a surface.
+pub(super) fn is_condition(path: &str) -> bool {
+    path.starts_with("boundaries.")
+}
+
 /// Every surface that the configuration names, with the path of its key.
 pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
     let mut names = Vec::new();

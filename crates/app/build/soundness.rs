@@ -97,9 +97,7 @@ fn layer_warning(mesh: &Mesh, surface: &str) -> Option<String> {
 /// A mesh file of an unusual size.
 pub(super) fn unit_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     let MeshConfig::File { unit, .. } = &config.mesh else { return None };
-    let [low, high] = mesh.bounding_box();
-    let size = norm(sub(high, low));
-    let [least, most] = USUAL;
+    let (size, [least, most]) = (size(mesh), USUAL);
     (size < least || size > most).then(|| {
         format!(
             "the mesh is {size:.4e} m from corner to corner: check mesh.unit, which is \"{}\"",
@@ -108,11 +106,16 @@ pub(super) fn unit_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     })
 }
 
+/// From corner to corner of a mesh [m].
+pub(super) fn size(mesh: &Mesh) -> f64 {
+    let [low, high] = mesh.bounding_box();
+    norm(sub(high, low))
+}
+
 /// Lengths of the design beyond the size of the mesh.
 pub(super) fn length_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
     let Some(design) = &config.design else { return Vec::new() };
-    let [low, high] = mesh.bounding_box();
-    let size = norm(sub(high, low));
+    let size = size(mesh);
     let lengths = [
         ("lower", Some(-design.lower)),
         ("upper", Some(design.upper)),

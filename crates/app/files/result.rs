@@ -115,7 +115,7 @@ impl RunResult {
 
     /// Names of the constraints that the best design violates.
     pub fn violated(&self) -> Vec<String> {
-        self.constraints.iter().filter(|own| !own.satisfied).map(|own| own.name.clone()).collect()
+        violated(&self.constraints).map(|own| own.name.clone()).collect()
     }
 }
 
@@ -192,8 +192,12 @@ pub struct Verification {
 impl Verification {
     /// The constraints that the best design violates there.
     pub fn violated(&self) -> impl Iterator<Item = &ConstraintResult> {
-        self.constraints.iter().filter(|constraint| !constraint.satisfied)
+        violated(&self.constraints)
     }
+}
+
+fn violated(constraints: &[ConstraintResult]) -> impl Iterator<Item = &ConstraintResult> {
+    constraints.iter().filter(|constraint| !constraint.satisfied)
 }
 
 impl ObjectiveResult {

@@ -52,7 +52,7 @@ use search::Searched;
 use shape_pair::ShapePair;
 
 use crate::build::locate_error::attribute_error;
-use crate::build::{Mode, Setup, motion_in_words, set_up_watched};
+use crate::build::{Mode, Setup, build_mesh, motion_in_words, set_up_watched};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
@@ -450,6 +450,11 @@ pub(crate) fn mesh_hash(config: &Config, mesh: &Mesh) -> MeshHash {
         nodes: topology.node_count(),
         tets: topology.tets().len(),
     }
+}
+
+/// That of the mesh that a configuration has now.
+pub(crate) fn current_mesh_hash(config: &Config, source: &SourceMap) -> Result<MeshHash, Error> {
+    Ok(mesh_hash(config, &build_mesh(config, source)?))
 }
 
 /// Does the work, and adds its wall time to `seconds` [s].

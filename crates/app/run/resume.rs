@@ -8,8 +8,8 @@ use fluxmorph_optimizer::Error as OptimizerError;
 
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
-use super::{Concluded, Options, Session, mesh_hash};
-use crate::build::{Mode, build_mesh};
+use super::{Concluded, Options, Session, current_mesh_hash};
+use crate::build::Mode;
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 use crate::files::{
@@ -148,7 +148,7 @@ impl Session<'_> {
 /// That the mesh file is not the one that a run was started with, where it is not: what it lacks is no error of the configuration.
 fn describe_other_mesh(manifest: &Manifest, config: &Config, source: &SourceMap) -> Option<String> {
     let was = manifest.mesh.as_ref().filter(|_| matches!(config.mesh, MeshConfig::File { .. }))?;
-    let is = mesh_hash(config, &build_mesh(config, source).ok()?);
+    let is = current_mesh_hash(config, source).ok()?;
     (is.blake3 != was.blake3).then(|| describe_meshes(&was.blake3, &is.blake3))
 }
 

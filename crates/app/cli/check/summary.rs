@@ -10,6 +10,7 @@ use fluxmorph_geometry::{Mesh, NodeId};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::{self, Quantity};
 use fluxmorph_optimizer::design::GridSide;
+use fluxmorph_optimizer::geometric::WallThickness;
 use fluxmorph_optimizer::problem::{Problem, Progress, Shape};
 use fluxmorph_remesh::MotionLaw;
 use fluxmorph_solver::FieldModel;
@@ -79,11 +80,8 @@ pub(super) struct Summary<'a> {
     /// Unit of the objective in SI; `None` where its terms have several.
     pub(super) objective_unit: Option<&'static str>,
     pub(super) constraints: &'a [Constraint],
-    /// Volumes [m³] and masses [kg] of the initial design that are constrained, by the names of the constraints.
-    pub(super) constrained_bodies: BTreeMap<String, f64>,
-    /// Least and greatest thickness [m] of the initial design, where that is constrained.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) constrained_thickness_m: Option<[f64; 2]>,
+    #[serde(flatten)]
+    pub(super) initial_shape: ConstrainedShape,
     pub(super) design: Option<&'a Design>,
     /// Whether the mesh follows all variables to their bounds.
     pub(super) reach: Vec<Reach>,
@@ -98,6 +96,16 @@ pub(super) struct Summary<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) estimate: Option<EstimateSummary>,
     pub(super) warnings: Vec<String>,
+}
+
+/// What constraints of the shape are measured by at the initial design.
+#[derive(Debug, Default, Serialize)]
+pub(super) struct ConstrainedShape {
+    /// Volumes [m³] and masses [kg], by the names of the constraints.
+    pub(super) constrained_bodies: BTreeMap<String, f64>,
+    /// Least and greatest thickness [m].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) constrained_thickness_m: Option<[f64; 2]>,
 }
 
 /// Whether there is a field to be computed.
@@ -249,8 +257,7 @@ pub(super) fn summary<'a>(
         objective: config.objective.as_ref(),
         objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,
-        constrained_bodies: constrained_bodies(problem)?,
-        constrained_thickness_m: constrained_thickness(problem)?,
+        initial_shape: ConstrainedShape::of(problem)?,
         design: config.design.as_ref(),
         reach: Reach::of(problem),
         remesh: config.remesh.as_ref(),
@@ -264,29 +271,23 @@ pub(super) fn summary<'a>(
     })
 }
 
-/// What constrained volumes and masses are initially.
-fn constrained_bodies(problem: &Problem) -> Result<BTreeMap<String, f64>, Error> {
-    let is_body = |own: &&constraint::Constraint| matches!(own.quantity, Quantity::Volume(_));
-    let mut bodies = problem.constraints().iter().filter(is_body).peekable();
-    let Some(shape) = problem.shape().filter(|_| bodies.peek().is_some()) else { return Ok(BTreeMap::new()) };
-    let moved = problem.moved(shape.initial()).map_err(OptimizerError::from)?;
-    let value = |own: &constraint::Constraint| {
-        let found = own.of_shape(&moved, shape).map_err(OptimizerError::from)?;
-        Ok(found.map(|(value, _)| (own.name.clone(), value)))
-    };
-    bodies.filter_map(|own| value(own).transpose()).collect()
-}
-
-/// The range of a constrained thickness initially.
-fn constrained_thickness(problem: &Problem) -> Result<Option<[f64; 2]>, Error> {
-    let is_wall = |own: &constraint::Constraint| matches!(own.quantity, Quantity::Thickness { .. });
-    let shape = problem.shape().filter(|_| problem.constraints().iter().any(is_wall));
-    let Some((shape, thickness)) = shape.and_then(|shape| Some((shape, shape.thickness()?))) else {
-        return Ok(None);
-    };
-    let moved = problem.moved(shape.initial()).map_err(OptimizerError::from)?;
-    let (least, most) = thickness.range(shape.surface(), &moved.mesh);
-    Ok(Some([least, most]))
+impl ConstrainedShape {
+    fn of(problem: &Problem) -> Result<Self, Error> {
+        let mut found = Self::default();
+        let of_shape = |own: &&constraint::Constraint| !own.quantity.is_of_field();
+        let mut constraints = problem.constraints().iter().filter(of_shape).peekable();
+        let Some(shape) = problem.shape().filter(|_| constraints.peek().is_some()) else { return Ok(found) };
+        let moved = problem.moved(shape.initial()).map_err(OptimizerError::from)?;
+        for own in constraints {
+            if let Quantity::Thickness { .. } = own.quantity {
+                let range = |thickness: &WallThickness| thickness.range(shape.surface(), &moved.mesh).into();
+                found.constrained_thickness_m = shape.thickness().map(range);
+            } else if let Some((value, _)) = own.of_shape(&moved, shape).map_err(OptimizerError::from)? {
+                found.constrained_bodies.insert(own.name.clone(), value);
+            }
+        }
+        Ok(found)
+    }
 }
 
 impl MeshFileSummary {

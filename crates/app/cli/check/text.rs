@@ -232,9 +232,11 @@ fn shape(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
 fn initially(constraint: &Constraint, summary: &Summary<'_>) -> String {
     let text = match constraint.limit {
         Limit::Thickness { .. } => summary
+            .initial_shape
             .constrained_thickness_m
             .map(|[least, most]| format!("{:.3} to {:.3} mm", Millimetres(least), Millimetres(most))),
         Limit::Functional { .. } => summary
+            .initial_shape
             .constrained_bodies
             .get(&constraint.name)
             .map(|value| format!("{value:.4e}{}", constraint.limit.dimension().behind_value())),

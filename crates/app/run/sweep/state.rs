@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{Planned, Sweep};
-use crate::build::build_mesh;
 use crate::config::{Config, MeshConfig, Optimizer, SourceMap, resolved_toml};
 use crate::files::{Disk, Manifest, MeshHash, OutputError, RunDirectory, RunResult, RunStatus, StopReason};
 use crate::run;
@@ -113,10 +112,7 @@ impl<'a> States<'a> {
             return true;
         };
         path.clone_from(now);
-        let is_that = || {
-            let mesh = build_mesh(&config, source);
-            mesh.is_ok_and(|mesh| run::mesh_hash(&config, &mesh).blake3 == *blake3)
-        };
+        let is_that = || run::current_mesh_hash(&config, source).is_ok_and(|own| own.blake3 == *blake3);
         *self.meshes.entry((now.clone(), blake3.clone())).or_insert_with(is_that)
     }
 }

@@ -314,7 +314,8 @@
     input.addEventListener("input", () => { stop(); state.shape = Number(input.value); redraw(); });
   });
   slider.parentNode.append("best");
-  slider.parentNode.hidden = data.before === data.after;
+  const rests = data.before === data.after;
+  slider.parentNode.hidden = rests;
   let playing = 0;
   function stop() { cancelAnimationFrame(playing); playing = 0; }
   const play = document.createElement("button");
@@ -332,7 +333,7 @@
     };
     playing = requestAnimationFrame(step);
   });
-  play.hidden = data.before === data.after;
+  play.hidden = rests;
   controls.append(play);
   control("Mesh lines", "input", (input) => {
     Object.assign(input, { type: "checkbox", checked: state.lines });

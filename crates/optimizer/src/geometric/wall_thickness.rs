@@ -42,6 +42,15 @@ struct Opposite {
     body: RegionId,
 }
 
+impl Opposite {
+    /// Where the ray against a direction leaves a body through a triangle.
+    fn new(hit: &Hit, direction: Point, (nodes, body): ([NodeId; 3], RegionId)) -> Self {
+        let &Hit { distance, weights, normal } = hit;
+        let growth = normal.map(|c| c / dot(normal, direction));
+        Self { distance, nodes, weights, growth, body }
+    }
+}
+
 /// The wall behind one design node.
 #[derive(Clone, Copy, Debug)]
 pub struct Wall {
@@ -54,7 +63,7 @@ pub struct Wall {
 /// The opposite face behind every design node.
 #[derive(Clone, Debug)]
 pub struct WallThickness {
-    /// `None` where the node has no direction.
+    /// `None` where the node has no direction, or its ray leads past the body at a rim.
     opposite: Vec<Option<Opposite>>,
 }
 
@@ -80,9 +89,8 @@ impl WallThickness {
             }
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
-                let (Hit { distance, weights, normal }, nodes) = of[&body].nearest(origin, back)?;
-                let growth = normal.map(|c| c / dot(normal, *direction));
-                Some(Some(Opposite { distance, nodes, weights, growth, body }))
+                let (hit, nodes) = of[&body].nearest(origin, back)?;
+                Some(Some(Opposite::new(&hit, *direction, (nodes, body))))
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
             let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
@@ -238,8 +246,8 @@ impl BodyFaces {
         // From a rim the ray runs along the facets of the body's side, and a round side is no plane; at the foot of a step it meets
         // the rim of a face that it does not go through.
         let goes_out = |i: &usize| {
-            let corners = &self.corners[*i];
-            dot(area_vector(*corners), direction) > 0.0 && !runs_along(direction, corners)
+            let normal = area_vector(self.corners[*i]);
+            dot(normal, direction) >= GRAZING * norm(normal)
         };
         let nearest = |of: &mut dyn Iterator<Item = usize>| {
             let met = of.filter_map(|i| Some((hit(origin, direction, &self.corners[i])?, i)));

@@ -21,25 +21,32 @@ fn the_plate_is_ten_millimetres_thick_at_every_node() {
     assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
 }
 
-/// Layers between these heights with air below and above.
-fn layers(heights: &[(&str, [f64; 2])]) -> Mesh {
-    let layer = |(name, [from, to]): &(&str, [f64; 2])| BoxRegion {
-        name: (*name).to_owned(),
-        corners: [[0.0, 0.0, *from], [1.0, 1.0, *to]],
-        size: [0.5; 3],
+/// Boxes with names in one of air.
+fn parts(air: [Point; 2], size: f64, parts: &[(&str, [Point; 2])]) -> Mesh {
+    let part = |&(name, corners): &(&str, [Point; 2])| BoxRegion {
+        name: name.to_owned(),
+        corners,
+        size: [size; 3],
         skin: [f64::INFINITY; 3],
         cells: None,
     };
     boxes(&BoxesParameters {
-        corners: [[0.0, 0.0, -0.5], [1.0, 1.0, 1.7]],
-        regions: heights.iter().map(layer).collect(),
+        corners: air,
+        regions: parts.iter().map(part).collect(),
         sizes: vec![],
         surfaces: vec![],
         growth: 2.0,
         refinement: 1.0,
         division: None,
     })
-    .expect("layers")
+    .expect("sound boxes")
+}
+
+/// Layers between these heights with air below and above.
+fn layers(heights: &[(&str, [f64; 2])]) -> Mesh {
+    let corners = |[from, to]: [f64; 2]| [[0.0, 0.0, from], [1.0, 1.0, to]];
+    let layers: Vec<_> = heights.iter().map(|&(name, ends)| (name, corners(ends))).collect();
+    parts(corners([-0.5, 1.7]), 0.5, &layers)
 }
 
 /// The faces at some heights as the design.
@@ -115,23 +122,9 @@ fn a_ray_that_misses_the_body_at_a_rim_costs_no_other_node_its_thickness() {
 /// A high plate on a wide one, both tops designed: rays at the edge of the step run along its side, past the wide plate's top.
 #[test]
 fn a_wall_does_not_end_at_the_foot_of_a_step() {
-    let part = |low: Point, high: Point| BoxRegion {
-        name: "plate".to_owned(),
-        corners: [low, high],
-        size: [0.25; 3],
-        skin: [f64::INFINITY; 3],
-        cells: None,
-    };
-    let mesh = boxes(&BoxesParameters {
-        corners: [[-0.5, -0.5, -0.5], [1.5, 1.5, 1.0]],
-        regions: vec![part([0.0, 0.0, 0.0], [1.0, 1.0, 0.2]), part([0.25, 0.25, 0.2], [0.75, 0.75, 0.3])],
-        sizes: vec![],
-        surfaces: vec![],
-        growth: 2.0,
-        refinement: 1.0,
-        division: None,
-    })
-    .expect("two plates");
+    let [wide, high] = [[[0.0, 0.0, 0.0], [1.0, 1.0, 0.2]], [[0.25, 0.25, 0.2], [0.75, 0.75, 0.3]]];
+    let air = [[-0.5, -0.5, -0.5], [1.5, 1.5, 1.0]];
+    let mesh = parts(air, 0.25, &[("plate", wide), ("plate", high)]);
     for designed in [&[0.2, 0.3][..], &[0.3]] {
         let surface = faces_at(&mesh, designed, Direction::Along([0.0, 0.0, 1.0]));
         let plate = mesh.topology().region("plate").expect("it is there");
@@ -149,18 +142,16 @@ fn a_plane_that_leans_and_moves_along_its_normal_is_as_far_as_along_the_ray() {
     let slope = 0.7_f64;
     let corners = [[-1.0, -1.0, -slope], [1.0, -1.0, slope], [0.0, 2.0, 0.0]];
     let (origin, direction) = ([0.1, 0.2, 1.5], [0.0, 0.0, 1.0]);
-    let Hit { distance, weights, normal } = hit(origin, [0.0, 0.0, -1.0], &corners).expect("it lies below");
-    assert!((distance - (1.5 - 0.1 * slope)).abs() < 1e-15, "{distance}");
-    let growth = normal.map(|c| c / dot(normal, direction));
-    let nodes = [1, 2, 3].map(NodeId);
-    let opposite = Opposite { distance, nodes, weights, growth, body: RegionId(0) };
-    let unit = normal.map(|c| c / norm(normal));
+    let met = hit(origin, [0.0, 0.0, -1.0], &corners).expect("it lies below");
+    assert!((met.distance - (1.5 - 0.1 * slope)).abs() < 1e-15, "{}", met.distance);
+    let opposite = Opposite::new(&met, direction, ([1, 2, 3].map(NodeId), RegionId(0)));
+    let unit = met.normal.map(|c| c / norm(met.normal));
     let moved = |n: NodeId| match n.index() {
         0 => origin,
         k => std::array::from_fn(|d| corners[k - 1][d] - 0.3 * unit[d] * unit[2].signum()),
     };
     let thickness = wall(NodeId(0), &opposite, &moved).thickness;
-    let expected = distance + 0.3 * (1.0 + slope * slope).sqrt();
+    let expected = met.distance + 0.3 * (1.0 + slope * slope).sqrt();
     assert!((thickness - expected).abs() < 1e-14, "{thickness} {expected}");
 }
 
@@ -179,8 +170,8 @@ fn a_wall_has_its_derivative_in_all_four_nodes_and_none_by_the_turn_of_a_triangl
                 moved[k][d] += h;
                 at(&moved).thickness
             };
-            // It is linear: rounding of numbers of order one over a step of one.
-            let difference = (shifted(0.5) - shifted(-0.5)) / 1.0;
+            // It is linear: over a step of one, rounding of numbers of order one.
+            let difference = shifted(0.5) - shifted(-0.5);
             assert!((derivative[d] - difference).abs() < 1e-14, "{k} {d}: {} {difference}", derivative[d]);
         }
     }
