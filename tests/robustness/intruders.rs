@@ -68,7 +68,10 @@ fn a_directory_that_is_removed_meanwhile_ends_the_run_with_five() {
     let output = run.wait_with_output().expect("it ends");
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(5), "{said}");
-    assert!(said.contains(&format!("cannot write `{}", out.display())), "{said}");
+    assert!(
+        said.contains(&format!("`{}` is no longer the folder in which this run began", out.display())),
+        "{said}"
+    );
     assert!(!said.contains("resume with"), "there is nothing left: {said}");
 }
 
@@ -81,7 +84,12 @@ fn a_directory_that_is_moved_meanwhile_is_gone_on_with_elsewhere() {
     let mut run = device.command("run", &out).stderr(Stdio::null()).spawn().expect("the program starts");
     wait_until("an evaluation", || rows(&out) > 0);
     std::fs::rename(&out, &moved).expect("moved");
+    // What another run writes there stays its own.
+    std::fs::create_dir(&out)
+        .and_then(|()| std::fs::write(out.join("result.json"), "another's"))
+        .expect("written");
     assert_eq!(end_of(&mut run).code(), Some(5));
+    assert_eq!(files(&out).len(), 1);
     // The configuration may have gone as well: the run has its own.
     std::fs::remove_file(&device.config).expect("removed");
     finish(&mut resume(&moved)).completed();

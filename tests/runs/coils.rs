@@ -220,6 +220,11 @@ fn a_weak_solid_conductor_has_its_inductance_at_every_frequency() {
         let run = home.path().join("run");
         fluxmorph(&[&"solve", &config, &"--out", &run, &"--quiet", &"--force", &"--set", &order]).completed();
         let result = read_json(&run.join("result.json"));
+        fluxmorph(&[&"report", &run]).completed();
+        let report = read_text(&run.join("report.html"));
+        for title in ["part, at 0 Hz", "part, at 5 Hz", "Inductances [H], at 0 Hz"] {
+            assert!(report.contains(title), "{title}");
+        }
         let of = |state: usize, key: &str| number(&result["states"][state]["coils"][0][key]);
         let linkage = |state: usize| phasor(&result["states"][state]["coils"][0]["flux_linkage_wb"])[0];
         let at_rest = number(&result["states"][0]["coils"][0]["flux_linkage_wb"]);
@@ -244,7 +249,12 @@ fn an_open_and_a_short_circuited_coil_are_two_loads_of_one_device() {
     let result = read_json(&folder.path().join("run/result.json"));
     fluxmorph(&[&"report", &folder.path().join("run")]).completed();
     let report = read_text(&folder.path().join("run/report.html"));
-    for fragment in ["under the load open", "under the load short", "the first of 2"] {
+    for fragment in [
+        "part, under the load open",
+        "part, under the load short",
+        "[H], under the load open",
+        "the first of 2",
+    ] {
         assert!(report.contains(fragment), "{fragment}");
     }
     assert_eq!(result["loads"], serde_json::json!(["open", "short"]));

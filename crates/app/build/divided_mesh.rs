@@ -1,15 +1,18 @@
 //! The mesh of a configuration with its cells divided where the device is.
 
-use fluxmorph_geometry::Mesh;
+use std::sync::Arc;
+
 use fluxmorph_geometry::generate::{
     BoxesParameters, Division, ShieldParameters, SphereParameters, boxes, shield, sphere,
 };
-use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::locate::locate;
+use fluxmorph_geometry::tet4::{Point, centroid, norm, sub};
+use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_optimizer::problem::Problem;
 
 use super::mesh::named_interfaces;
-use super::open;
 use super::references::functionals;
+use super::{build_mesh, open};
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 
@@ -62,8 +65,38 @@ impl DividedMesh {
             Self::Boxes(parameters) => boxes(parameters),
             Self::Sphere(parameters) => sphere(parameters),
         }?;
+        let measured = functionals(config).into_iter().filter(|(_, own)| own.kind.is_over_cells());
+        let is_one_of_elements = |name: &&str| mesh.topology().given_cells(name).is_none();
+        let names: Vec<&str> =
+            measured.filter_map(|(_, own)| own.region.as_deref()).filter(is_one_of_elements).collect();
+        let mesh =
+            if names.is_empty() { mesh } else { with_cells_of(&build_mesh(config, source)?, &mesh, &names)? };
         open::with_shell(named_interfaces(mesh, config)?, config, source)
     }
+}
+
+/// The divided mesh with the cells that a coarser one has in regions of which every element is one: a sum over cells has the same
+/// terms then. An element belongs to the one that its centroid is in; beside a round face, to the nearest.
+fn with_cells_of(coarse: &Mesh, mesh: &Mesh, names: &[&str]) -> Result<Mesh, MeshError> {
+    let mut topology = mesh.topology().as_ref().clone();
+    for name in names {
+        let own = coarse.topology().elements_of(coarse.topology().region(name)?);
+        let places: Vec<Point> = own.iter().map(|&e| centroid(coarse.vertices(e))).collect();
+        let nearest = |point: Point| {
+            let apart = |i: &usize| norm(sub(places[*i], point));
+            (0..own.len()).min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or_default()
+        };
+        let elements = topology.elements_of(topology.region(name)?);
+        let middles: Vec<Point> = elements.iter().map(|&e| centroid(mesh.vertices(e))).collect();
+        let mut cells = vec![Vec::new(); own.len()];
+        for ((element, point), located) in elements.iter().zip(&middles).zip(locate(coarse, &middles)) {
+            let place = located.and_then(|(e, _)| own.binary_search(&e).ok());
+            cells[place.unwrap_or_else(|| nearest(*point))].push(*element);
+        }
+        cells.retain(|cell| !cell.is_empty());
+        topology = topology.with_cells(name, cells);
+    }
+    Mesh::new(Arc::new(topology), mesh.points().to_vec())
 }
 
 /// The box around everything that moves and everything that objective and constraints take of the field.
@@ -79,4 +112,46 @@ fn device(config: &Config, problem: &Problem) -> Option<[Point; 2]> {
         let [low, high] = around.unwrap_or([x, x]);
         Some([[0, 1, 2].map(|d| low[d].min(x[d])), [0, 1, 2].map(|d| high[d].max(x[d]))])
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fluxmorph_geometry::ElementId;
+    use fluxmorph_geometry::generate::BoxRegion;
+    use fluxmorph_geometry::tet4::volume;
+
+    #[test]
+    fn the_cells_of_a_divided_mesh_are_the_elements_that_were_divided() {
+        let region = |name: &str, corners| BoxRegion {
+            name: name.to_owned(),
+            corners,
+            size: [1.0; 3],
+            skin: [f64::INFINITY; 3],
+            cells: None,
+        };
+        let observed = [[0.0; 3], [2.0, 1.0, 1.0]];
+        let parameters = |division| BoxesParameters {
+            corners: [[-2.0; 3], [3.0; 3]],
+            regions: vec![region("observed", observed)],
+            sizes: Vec::new(),
+            surfaces: Vec::new(),
+            growth: 2.0,
+            refinement: 1.0,
+            division,
+        };
+        let coarse = boxes(&parameters(None)).expect("a box");
+        let fine = boxes(&parameters(Some(Division { inside: observed, parts: 2 }))).expect("a finer box");
+        let fine = with_cells_of(&coarse, &fine, &["observed"]).expect("cells");
+        let of =
+            |mesh: &Mesh| mesh.topology().cells_of(mesh.topology().region("observed").expect("a region"));
+        let volume_of =
+            |mesh: &Mesh, cell: &[ElementId]| -> f64 { cell.iter().map(|&e| volume(mesh.vertices(e))).sum() };
+        let (elements, cells) = (of(&coarse), of(&fine));
+        assert_eq!(elements.len(), cells.len());
+        for (element, cell) in elements.iter().zip(&cells) {
+            assert_eq!(cell.len(), 8, "two parts along each axis");
+            assert!((volume_of(&coarse, element) - volume_of(&fine, cell)).abs() < 1e-12);
+        }
+    }
 }

@@ -1,9 +1,13 @@
 //! Objective and constraints of a configuration on its states.
 
+mod faults;
+
+pub(super) use faults::faults;
+
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, RegionId, Topology};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, RegionId};
 use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::geometric;
@@ -12,12 +16,10 @@ use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_solver::functional::{self, AtTerminals, Follow, Inductive, Observed, Volume, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
-use super::entries::material;
 use super::references::{functionals, regions};
 use super::shape::may_move;
 use crate::config::{
-    self, Combination, Config, Diagnostic, Limit as Written, LoadCase, ObjectiveKind, RegionModel, SourceMap,
-    ValueBound,
+    self, Combination, Config, Diagnostic, Limit as Written, LoadCase, ObjectiveKind, SourceMap, ValueBound,
 };
 use crate::error::Error;
 
@@ -32,125 +34,6 @@ pub(crate) fn with_cells_written_down(config: &Config, mesh: &Mesh) -> Result<Me
         }
     }
     Mesh::new(Arc::new(topology), mesh.points().to_vec())
-}
-
-/// What objective and constraints ask of regions that these cannot give.
-pub(super) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
-    let mut faults = Vec::new();
-    let known = |name: &&str| topology.region(name).is_ok();
-    faults.extend(body_faults(config, source));
-    faults.extend(coil_faults(config, source));
-    faults.extend(super::multipole::faults(config, source));
-    faults.extend(mass_faults(config, source, topology));
-    let is_of_a_region = |f: &config::Functional| f.kind.is_of_a_region() && f.kind.is_of_field();
-    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| is_of_a_region(f)) {
-        let Some(region) = functional.region.as_deref().filter(known) else { continue };
-        let model = config.regions.get(region).map(|entry| entry.model);
-        let is_loss = functional.kind == ObjectiveKind::Loss;
-        let (message, expected) = match model {
-            Some(RegionModel::Perfect) if is_loss => (
-                format!("`{region}` is a perfect conductor, so it has no eddy-current loss"),
-                "a region whose material conducts, with another model",
-            ),
-            _ if is_loss && material(config, region).conductivity == 0.0 => (
-                format!("`{region}` does not conduct, so it has no eddy-current loss"),
-                "a region whose material conducts",
-            ),
-            Some(RegionModel::Impedance | RegionModel::Perfect) if !is_loss => {
-                (format!("`{region}` is replaced by its surface"), "a region that is meshed, such as air")
-            }
-            _ => continue,
-        };
-        faults.push(source.diagnostic(&format!("{path}.region"), message).expected(expected));
-    }
-    faults
-}
-
-/// Masses of regions without density.
-fn mass_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
-    let masses = functionals(config).into_iter().filter(|(_, f)| f.kind == ObjectiveKind::Mass);
-    let fault = |(path, functional): (String, &config::Functional)| {
-        let region = functional.region.as_deref().filter(|name| topology.region(name).is_ok())?;
-        if density(config, region).is_some() {
-            return None;
-        }
-        let entry = config.regions.get(region);
-        let what = if entry.is_some() { "its material has no density" } else { "it has no material" };
-        let message = format!("the mass of `{region}` is asked for, but {what}");
-        let fault = source.diagnostic(&format!("{path}.kind"), message);
-        Some(match entry {
-            Some(entry) => fault.help(format!(
-                "add a line like: density = \"7850 kg/m3\" to [materials.{}], or take the volume",
-                entry.material
-            )),
-            None => fault.expected("a region with a material, or kind = \"volume\""),
-        })
-    };
-    masses.filter_map(fault).collect()
-}
-
-/// Bodies that are not there, and bodies that are not meshed.
-fn body_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
-    let mut faults = Vec::new();
-    let known: Vec<&str> = config.forces.iter().map(|force| force.name.as_str()).collect();
-    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_a_body()) {
-        let name = functional.region.as_deref().unwrap_or_default();
-        if !name.is_empty() && !known.contains(&name) {
-            faults.push(source.unknown_name(&format!("{path}.region"), "body of [[forces]]", name, &known));
-        }
-    }
-    for (k, force) in config.forces.iter().enumerate() {
-        for (i, name) in force.regions.iter().enumerate() {
-            if !config.is_meshed(name) {
-                let path = format!("forces[{k}].regions[{i}]");
-                let message = format!("`{name}` is replaced by its surface, so there is no body to displace");
-                faults.push(source.diagnostic(&path, message).expected("a region that is meshed"));
-            }
-        }
-    }
-    faults
-}
-
-/// Coils that are not there, have no winding, or are asked for what they do not have.
-fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
-    let mut faults = Vec::new();
-    let known: Vec<&str> = config.coils.iter().map(|coil| coil.name.as_str()).collect();
-    for (path, functional) in functionals(config) {
-        let kind = functional.kind.name();
-        let given: Vec<LoadCase<'_>> =
-            config.load_cases().into_iter().filter(|case| functional.is_taken_under(case)).collect();
-        for (k, name) in functional.coils.iter().flatten().enumerate() {
-            let path = format!("{path}.coils[{k}]");
-            let Some(index) = known.iter().position(|known| known == name) else {
-                faults.push(source.unknown_name(&path, "coil", name, &known));
-                continue;
-            };
-            let coil = &config.coils[index];
-            if coil.turns.is_none() {
-                let message = format!("the coil `{name}` has no turns, so there is no {kind} of it");
-                let help = format!("add a line like: turns = 10 to coils[{index}]");
-                faults.push(source.diagnostic(&path, message).help(help));
-            } else if functional.kind == ObjectiveKind::Current
-                && let Some(case) = given.iter().find(|case| !case.feed(coil).by_voltage)
-            {
-                let under = case.name().map_or(String::new(), |load| format!(" under the load `{load}`"));
-                let message =
-                    format!("the current of the coil `{name}` is given{under}: no shape changes it");
-                faults.push(source.diagnostic(&path, message).expected("a coil that a voltage drives"));
-            }
-        }
-        let is_of_inductances = functional.coils.is_some()
-            && !matches!(functional.kind, ObjectiveKind::FluxLinkage)
-            && functional.kind.may_be_static();
-        if is_of_inductances && config.saturating_region().is_some() {
-            let message = format!(
-                "`{path}` is of inductances, which a B–H curve does not have: they depend on the current"
-            );
-            let fault = source.diagnostic(&format!("{path}.kind"), message);
-            faults.push(fault.expected("flux_linkage, or materials with a permeability"));
-        }
-    }
-    faults
 }
 
 /// Mass density [kg/m³] of a region's material, if it is given.

@@ -4,6 +4,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::geometric::WallThickness;
@@ -12,6 +13,7 @@ use fluxmorph_remesh::{KinematicConstraint, MotionLaw};
 use super::RefinedMesh;
 use super::curves::Curves;
 use super::elastic_body::{regions_at, remesh_setup};
+use super::entries::is_air;
 use super::names::name_faults;
 use super::shape::thickened_regions;
 use super::skin::{Audited, audits};
@@ -43,7 +45,9 @@ pub struct OutlinedDesign {
     pub triangles: Vec<[NodeId; 3]>,
     /// The regions that a positive design thickens; else those with an entry of their own at the surface; else none.
     pub bodies: Vec<RegionId>,
-    /// Thickness of the designed bodies, where they have one and all that lies opposite is held.
+    /// These, and the regions of matter ahead of the surface: whose boundaries are the shape.
+    pub shown: Vec<RegionId>,
+    /// Thickness of the designed bodies, where they have one.
     pub thickness: Option<WallThickness>,
     /// Elements of `mesh` that may move, ascending.
     pub moving: Vec<ElementId>,
@@ -105,16 +109,18 @@ fn outline_design(
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
     let mut bodies = thickened_regions(full_mesh, &surface, config);
-    let free = config.remesh.iter().flat_map(|remesh| &remesh.free);
-    let free: BTreeSet<NodeId> =
-        free.filter_map(|name| topology.surface(name).ok()).flatten().flatten().copied().collect();
-    let is_held = |node: NodeId| !free.contains(&node) && surface.nodes().binary_search(&node).is_err();
-    let thickness = WallThickness::measure(full_mesh, &bodies, &surface)
-        .filter(|thickness| thickness.opposite_nodes().all(is_held));
+    let thickness = WallThickness::measure(full_mesh, &bodies, &surface);
     let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
     if bodies.is_empty() {
         bodies = regions_at(full_mesh, surface.nodes()).into_iter().filter(has_entry).collect();
     }
+    let is_designed = |facet: &&Facet| facet.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok());
+    let beside = topology.facets().iter().filter(is_designed);
+    let beside = beside.flat_map(|facet| [Some(facet.inside), facet.outside]).flatten();
+    let beside: BTreeSet<RegionId> = beside.map(|e| topology.region_of()[e.index()]).collect();
+    let is_matter = |r: &RegionId| has_entry(r) && !is_air(config, &topology.region_names()[r.index()]);
+    let shown = beside.into_iter().filter(is_matter).chain(bodies.iter().copied());
+    let shown = shown.collect::<BTreeSet<_>>().into_iter().collect();
     let moving = match &config.remesh {
         Some(remesh) => {
             let nodes: Vec<NodeId> =
@@ -132,7 +138,7 @@ fn outline_design(
         }
         None => Vec::new(),
     };
-    Ok(OutlinedDesign { surface, triangles, bodies, thickness, moving })
+    Ok(OutlinedDesign { surface, triangles, bodies, shown, thickness, moving })
 }
 
 #[cfg(test)]

@@ -337,14 +337,15 @@ fn vanishing_faults(
             Err(_) => mesh.point(node),
         };
         let left = thickness.walls(surface, moved).map(|(_, wall)| wall.thickness);
-        let initial = thickness.at_nodes().map(|(_, thickness)| thickness);
         // Of the bound, the share that takes all of the wall: the least one is what is left to go to.
-        let spent = left.zip(initial).filter(|(left, _)| *left <= 0.0);
-        let share = spent.map(|(left, thickness)| (thickness / (thickness - left), thickness));
-        let Some((share, thickness)) = share.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+        let spent = left.zip(thickness.at_nodes()).filter(|(left, _)| *left <= 0.0);
+        let share = spent.map(|(left, (i, thickness))| (thickness / (thickness - left), i, thickness));
+        let Some((share, i, thickness)) = share.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
         let message = format!(
-            "`{key}` is {:.3} mm, and the body is {:.3} mm thick there: nothing would be left of it",
+            "`{key}` is {:.3} mm, and at {} the body is {:.3} mm thick along the design's direction: with all variables there \
+             nothing would be left of it",
             Millimetres(bound),
+            millimetres(mesh.point(surface.nodes()[i])),
             Millimetres(thickness)
         );
         let fault = source.diagnostic(key, message);

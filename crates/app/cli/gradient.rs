@@ -51,12 +51,18 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             })?;
         // No bar may stand where the table goes.
         drop(observer);
-        print(&certificates, &settings, work.json)
+        let has_table = config.saturating_region().is_some()
+            && config.materials.values().any(|material| material.bh.is_some() || material.bh_file.is_some());
+        print(&certificates, &settings, (work.json, has_table))
     })
 }
 
-/// Prints the certificates, as JSON or as tables.
-fn print(certificates: &Certificates, settings: &Settings, json: bool) -> Result<ExitCode, Error> {
+/// Prints the certificates, as JSON or as tables; what may be to blame is said where a B–H curve is a table.
+fn print(
+    certificates: &Certificates,
+    settings: &Settings,
+    (json, has_table): (bool, bool),
+) -> Result<ExitCode, Error> {
     let constraints = certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
     let all: Vec<(&Certificate, &str)> =
         std::iter::once((&certificates.objective, "F")).chain(constraints).collect();
@@ -72,7 +78,11 @@ fn print(certificates: &Certificates, settings: &Settings, json: bool) -> Result
     };
     let is_of_second_order =
         certificate.directions.iter().all(|direction| direction.slope >= settings.least_slope);
-    let cure = if is_of_second_order {
+    let cure = if is_of_second_order && has_table {
+        "; the slope is that of a right gradient: differences lose digits where elements cross a point of a B–H table, at which the \
+         curve's second derivative jumps, and by what the residual of the linear solver leaves. A curve in closed form \
+         (materials.NAME.saturation) or analysis.linear_solver.tolerance = 1e-14 tells"
+    } else if is_of_second_order {
         "; the slope is that of a right gradient: what the residual of the linear solver leaves of differences may be larger than they \
          are, and analysis.linear_solver.tolerance = 1e-14 tells"
     } else {

@@ -26,8 +26,8 @@ use crate::run::sweep::ENDS_WITH_STDIN;
 use crate::show;
 
 /// What is shown at the first signal of a run.
-pub(super) const FINISHES_EVALUATION: &str =
-    "finishing the current evaluation, then saving; interrupt again to exit at once";
+pub(super) const FINISHES_AND_SAVES: &str =
+    "finishing the current work, then saving; interrupt again to exit at once";
 
 /// What is shown at the first signal of other commands.
 pub(super) const FINISHES_WORK: &str = "finishing the current work; interrupt again to exit at once";

@@ -18,7 +18,7 @@ use crate::show::report::ReportedRun;
 
 /// Do what the command line says.
 pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
-    let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
+    let signal = interrupt::watch(interrupt::FINISHES_AND_SAVES);
     let (config, source) = args.load()?;
     let work = &args.common.work;
     let page = |held: &RunDirectory| page_so_far(config.output.report, held);
@@ -33,7 +33,7 @@ pub(super) fn run(args: &RunArgs) -> Result<ExitCode, Error> {
 
 /// Do what the command line says.
 pub(super) fn resume(args: &ResumeArgs) -> Result<ExitCode, Error> {
-    let signal = interrupt::watch(interrupt::FINISHES_EVALUATION);
+    let signal = interrupt::watch(interrupt::FINISHES_AND_SAVES);
     let saved = SavedRun::open(&system_disk(), &args.directory)?;
     let (config, source) = saved.config();
     let page = |held: &RunDirectory| page_so_far(config.output.report, held);

@@ -11,6 +11,8 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::io::read_at_most;
 
+use super::synced::folder_of;
+
 /// Operations on files and folders. All but [`Disk::read`] and [`Disk::names`] change something, and all fail where the
 /// operating system refuses; what else they fail with stands with them.
 pub trait Disk: Debug + Send + Sync {
@@ -74,9 +76,37 @@ pub enum Sharing {
 }
 
 /// A lock, held until it is dropped or its process ends.
-pub trait DiskLock: Debug + Send + Sync {}
+pub trait DiskLock: Debug + Send + Sync {
+    /// Whether what lies at a path is another folder than that in which the file was locked, or nothing, and the file another one.
+    fn is_replaced(&self, folder: &Path, file: &Path) -> bool;
+}
 
-impl DiskLock for File {}
+/// A locked file, and its folder, which stays the same one wherever it is moved to.
+#[derive(Debug)]
+struct Locked {
+    file: File,
+    folder: Option<File>,
+}
+
+impl DiskLock for Locked {
+    fn is_replaced(&self, folder: &Path, file: &Path) -> bool {
+        let differs = |held: &File, path: &Path| !held.metadata().is_ok_and(|own| is_same(&own, path));
+        self.folder.as_ref().is_some_and(|held| differs(held, folder)) && differs(&self.file, file)
+    }
+}
+
+/// Whether an entry is what lies at a path; other systems than Unix do not let go of what is open.
+#[cfg(unix)]
+fn is_same(entry: &fs::Metadata, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let place = |entry: &fs::Metadata| (entry.dev(), entry.ino());
+    fs::metadata(path).is_ok_and(|there| place(&there) == place(entry))
+}
+
+#[cfg(not(unix))]
+fn is_same(_: &fs::Metadata, path: &Path) -> bool {
+    path.exists()
+}
 
 /// A file that is written.
 pub trait DiskFile: Write + Debug + Send {
@@ -131,7 +161,7 @@ impl Disk for SystemDisk {
             Sharing::Shared => file.try_lock_shared(),
         };
         match locked {
-            Ok(()) => Ok(Some(Box::new(file))),
+            Ok(()) => Ok(Some(Box::new(Locked { file, folder: File::open(folder_of(path)).ok() }))),
             Err(TryLockError::WouldBlock) => Err(io::ErrorKind::ResourceBusy.into()),
             Err(TryLockError::Error(_)) => Ok(None),
         }

@@ -99,6 +99,12 @@ pub enum OutputError {
         /// The directory, or the file in it that is held.
         path: PathBuf,
     },
+    /// The folder in which a run began is another one, or gone.
+    #[error(
+        "`{path}` is no longer the folder in which this run began: it was moved, removed or replaced meanwhile, and nothing is \
+         written into what is there now. Where it was moved to, `fluxmorph resume` goes on there"
+    )]
+    Replaced { path: PathBuf },
     /// A folder of a run is a link.
     #[error(
         "`{path}` is a link, and nothing is written through links; remove it; a new run may write elsewhere with --out"

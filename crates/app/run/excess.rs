@@ -5,14 +5,14 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::Readable;
 use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::{Mesh, Readable};
 use fluxmorph_optimizer::constraint::{Bound, Quantity};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::audit::{ExcessLoss, excess_losses};
 use fluxmorph_solver::circuit::{currents, powers};
-use fluxmorph_solver::{FieldModel, FieldSolution};
+use fluxmorph_solver::{Boundary, FieldModel, FieldSolution};
 
 use super::Session;
 use super::reported::under;
@@ -66,9 +66,9 @@ pub(super) struct LeftOut(Vec<OfState>);
 
 /// What they leave out of one state.
 struct OfState {
-    /// Of losses, by region [W].
-    losses: BTreeMap<String, f64>,
-    /// The one coil, where all losses are its.
+    /// Losses of surfaces and what they leave out, by region [W].
+    losses: BTreeMap<String, [f64; 2]>,
+    /// The one coil, where it alone excites the field: then all losses are its.
     coil: Option<OneCoil>,
 }
 
@@ -79,21 +79,58 @@ struct OneCoil {
     current: f64,
     /// Its power, complex [W].
     power: c64,
+    /// The reactance in series with it where a voltage drives it [Ω].
+    behind_voltage: Option<f64>,
+}
+
+impl OneCoil {
+    /// `2 P / I²` [Ω]; `None` of a coil without current.
+    fn impedance_of(&self, power: c64) -> Option<c64> {
+        (self.current > 0.0).then(|| 2.0 * power / self.current.powi(2))
+    }
+
+    /// What becomes of all losses where the resistance grows by that of so many more [W]: of a voltage less current comes.
+    fn share_left(&self, more: f64) -> Option<f64> {
+        let Some(reactance) = self.behind_voltage else { return Some(1.0) };
+        let before = self.impedance_of(self.power)? + c64::new(0.0, reactance);
+        Some((before / (before + self.impedance_of(more.into())?)).norm_sqr())
+    }
+
+    /// That of a state; `None` where something else excites the field, too.
+    fn of(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Option<Self> {
+        let setup = model.setup();
+        let is_applied = |boundary: &Boundary| matches!(boundary, Boundary::UniformField(_));
+        let (currents, powers) = (currents(model, solution), powers(model, mesh, solution));
+        let ([winding], [(_, current)], [(_, power)]) = (&setup.windings[..], &currents[..], &powers[..])
+        else {
+            return None;
+        };
+        let driven = winding.filter(|winding| winding.voltage.is_some());
+        let behind_voltage = driven.map(|winding| winding.impedance(model.angular_frequency()).im);
+        let own = Self { current: current.norm(), power: *power, behind_voltage };
+        (!setup.boundaries.iter().any(|(_, boundary)| is_applied(boundary))).then_some(own)
+    }
 }
 
 impl OfState {
     /// What a quantity of this kind has more, of a region or of a coil; `None` where it has no loss of a surface.
     fn more(&self, kind: &str, region: Option<&String>) -> Option<f64> {
         let is = |own: ObjectiveKind| kind == own.name();
-        let all = || self.losses.values().copied().reduce(|a, b| a + b);
-        let coil = self.coil.filter(|coil| coil.current > 0.0);
+        let all = || self.losses.values().map(|[_, more]| *more).reduce(|a, b| a + b);
+        let left = |coil: OneCoil| coil.share_left(all()?);
         match region {
-            Some(region) if is(ObjectiveKind::Loss) => self.losses.get(region).copied(),
-            _ if is(ObjectiveKind::Power) && coil.is_some() => all(),
-            _ if is(ObjectiveKind::Resistance) => Some(2.0 * all()? / coil?.current.powi(2)),
+            Some(region) if is(ObjectiveKind::Loss) => {
+                let [own, more] = self.losses.get(region)?;
+                Some((own + more) * self.coil.map_or(Some(1.0), left)? - own)
+            }
+            _ if is(ObjectiveKind::Power) => {
+                let own = self.coil?.power.re;
+                Some((own + all()?) * left(self.coil?)? - own)
+            }
+            _ if is(ObjectiveKind::Resistance) => Some(self.coil?.impedance_of(all()?.into())?.re),
             // Q = X/R: the reactance stays.
             _ if is(ObjectiveKind::QualityFactor) => {
-                let power = coil?.power;
+                let OneCoil { power, .. } = self.coil.filter(|coil| coil.current > 0.0)?;
                 Some(power.im / (power.re + all()?) - power.im / power.re)
             }
             _ => None,
@@ -106,14 +143,8 @@ impl LeftOut {
     pub(super) fn of(problem: &Problem, analysis: &Analysis) -> Self {
         let of_state = |(model, solution): (&FieldModel, &FieldSolution)| {
             let found = excess_losses(model, &analysis.mesh, solution).into_iter();
-            let losses = found.map(|own| (own.region.clone(), own.more())).collect();
-            let coil = match (&currents(model, solution)[..], &powers(model, &analysis.mesh, solution)[..]) {
-                ([(_, current)], [(_, power)]) if model.coils().len() == 1 => {
-                    Some(OneCoil { current: current.norm(), power: *power })
-                }
-                _ => None,
-            };
-            OfState { losses, coil }
+            let losses = found.map(|own| (own.region.clone(), [own.of_surface, own.more()])).collect();
+            OfState { losses, coil: OneCoil::of(model, &analysis.mesh, solution) }
         };
         Self(problem.states().iter().zip(&analysis.solutions).map(of_state).collect())
     }
@@ -215,8 +246,8 @@ mod tests {
 
     #[test]
     fn what_is_left_out_is_of_losses_and_of_what_one_coil_sees_of_them() {
-        let losses = BTreeMap::from([("plate".to_owned(), 3.0), ("wall".to_owned(), 1.0)]);
-        let coil = OneCoil { current: 4.0, power: c64::new(6.0, 60.0) };
+        let losses = BTreeMap::from([("plate".to_owned(), [2.0, 3.0]), ("wall".to_owned(), [2.0, 1.0])]);
+        let coil = OneCoil { current: 4.0, power: c64::new(6.0, 60.0), behind_voltage: None };
         let mut state = OfState { losses, coil: Some(coil) };
         let plate = "plate".to_owned();
         assert_eq!(state.more("loss", Some(&plate)), Some(3.0));
@@ -225,8 +256,15 @@ mod tests {
         assert_eq!(state.more("resistance", None), Some(0.5), "2 P / I²");
         assert_eq!(state.more("quality_factor", None), Some(-4.0), "60 / 10 less 60 / 6");
         assert_eq!(state.more("energy", Some(&plate)), None);
+        // 0.75 Ω become 1.25 Ω, and the 7.5 Ω of the coil are in resonance with what is in series: 3/5 of the current is left.
+        state.coil = Some(OneCoil { behind_voltage: Some(-7.5), ..coil });
+        let more = |state: &OfState, kind, region| state.more(kind, region).expect("it has a surface's loss");
+        assert!((more(&state, "power", None) - (10.0 * 0.36 - 6.0)).abs() < 1e-12);
+        assert!((more(&state, "loss", Some(&plate)) - (5.0 * 0.36 - 2.0)).abs() < 1e-12);
+        assert_eq!(state.more("resistance", None), Some(0.5), "that of 1 A");
         state.coil = None;
         assert_eq!(state.more("resistance", None), None, "of several coils nothing is known");
+        assert_eq!(state.more("loss", Some(&plate)), Some(3.0));
     }
 
     #[test]

@@ -328,7 +328,12 @@ impl Session<'_> {
             && self.is_worth_resuming(error)
         {
             let command = resume_command(self.directory.path());
-            observer.warning(&format!("what was computed is kept: resume with `{command}`"));
+            let kept = match Journal::read_records(&self.directory).map_or(0, |records| records.len()) {
+                0 => "no evaluation was kept".to_owned(),
+                1 => "one evaluation is kept".to_owned(),
+                kept => format!("{kept} evaluations are kept"),
+            };
+            observer.warning(&format!("{kept}: resume with `{command}`"));
         }
         let result = outcome?;
         completed?;

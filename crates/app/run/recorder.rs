@@ -116,6 +116,8 @@ impl DirectoryRecorder {
             );
             return Err(Error::NotResumable { path: self.directory.path().to_owned(), cause });
         }
+        // A log that is open goes on wherever its folder is moved to; what is written at the end does not.
+        self.directory.check_place()?;
         let is_first = self.level != Some(record.row.level);
         self.level = Some(record.row.level);
         if is_wanted(self.kept, record, is_first) {

@@ -9,8 +9,8 @@ use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
     Accuracy, Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT,
-    MultipoleResult, ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, SaturationResult,
-    StateErrors, StateResult, Verdict, Verification, VerificationMesh, WHERE_LEFT_OUT,
+    MultipoleResult, ObjectiveResult, ProbeResult, RunResult, RunStatus, SAFETY, SaturatedRegion,
+    SaturationResult, StateErrors, StateResult, Verdict, Verification, VerificationMesh, WHERE_LEFT_OUT,
 };
 use crate::printable::printable;
 
@@ -104,9 +104,12 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         rows.extend(saturation.regions.iter().map(|region| saturated(region, at)));
         rows.push(("Newton steps", format!("{}{at}", saturation.newton_steps)));
     }
-    rows.extend(coils(result));
-    for set in &result.multipoles {
-        rows.push(("expansion", expansion_text(set, result.errors.as_ref())));
+    for (at, state) in &states {
+        rows.extend(state.coils.iter().map(|coil| ("coil", coil_text(coil, state.errors) + at)));
+    }
+    for (at, state) in &states {
+        let text = |set| expansion_text(set, state.errors) + at;
+        rows.extend(state.multipoles.iter().map(|set| ("expansion", text(set))));
     }
     if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
         rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
@@ -126,24 +129,13 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     rows.push(("worst residual", format!("{:.1e}{method}", result.linear_solver.worst_residual)));
     rows.push(("time", times(result)));
     rows.push(("peak memory", format!("{:.0} MiB", result.peak_memory_bytes as f64 / (1024.0 * 1024.0))));
-    let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
-    let rows = rows.into_iter().map(|(name, text)| format!("{name:<22} {text}"));
-    rows.chain(probes::lines(&result.probes, result.errors.as_ref(), frequency)).collect()
-}
-
-/// What the terminals of coils see, under several loads for each.
-fn coils(result: &RunResult) -> Vec<Row> {
-    if result.loads.is_empty() {
-        let row = |coil| ("coil", coil_text(coil, result.errors.as_ref()));
-        return result.coils.iter().map(row).collect();
+    let mut lines: Vec<String> = rows.into_iter().map(|(name, text)| format!("{name:<22} {text}")).collect();
+    for (at, state) in &states {
+        let own = probes::lines(state.probes, state.errors, state.frequency);
+        let title = (!at.is_empty() && !own.is_empty()).then(|| format!("{:<22}{at}", "probes"));
+        lines.extend(title.into_iter().chain(own));
     }
-    let of_state = |state: &StateResult| -> Vec<Row> {
-        let under =
-            state.load.as_deref().map(|load| format!(" under {}", printable(load))).unwrap_or_default();
-        let row = |coil| ("coil", format!("{}{under}", coil_text(coil, state.errors.as_ref())));
-        state.coils.iter().map(row).collect()
-    };
-    result.states.iter().flat_map(of_state).collect()
+    lines
 }
 
 /// The error bar of a value with an estimated error, behind it.
@@ -360,26 +352,34 @@ fn constraint_row(constraint: &ConstraintResult, named: &Named, styles: &Styles)
 
 /// What a state has.
 struct State<'a> {
+    frequency: f64,
     losses: &'a BTreeMap<String, f64>,
     forces: &'a [BodyForce],
     saturation: Option<&'a SaturationResult>,
+    coils: &'a [CoilResult],
+    multipoles: &'a [MultipoleResult],
+    probes: &'a [ProbeResult],
     errors: Option<&'a StateErrors>,
 }
 
 /// The states, with the words that tell each from the others.
 fn states(result: &RunResult) -> Vec<(String, State<'_>)> {
     if result.states.is_empty() {
-        let RunResult { losses_w: losses, forces, saturation, errors, .. } = result;
-        let (saturation, errors) = (saturation.as_ref(), errors.as_ref());
-        return vec![(String::new(), State { losses, forces, saturation, errors })];
+        let RunResult { losses_w: losses, forces, coils, multipoles, probes, .. } = result;
+        let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
+        let (saturation, errors) = (result.saturation.as_ref(), result.errors.as_ref());
+        let own = State { frequency, losses, forces, saturation, coils, multipoles, probes, errors };
+        return vec![(String::new(), own)];
     }
     let of = result.states.iter().map(|own| {
-        let StateResult { load, frequency_hz, losses_w: losses, forces, saturation, errors, .. } = own;
-        let at = match load {
+        let StateResult { losses_w: losses, forces, coils, multipoles, probes, .. } = own;
+        let frequency = own.frequency_hz;
+        let at = match &own.load {
             Some(load) => format!(" under {}", printable(load)),
-            None => format!(" at {frequency_hz} Hz"),
+            None => format!(" at {frequency} Hz"),
         };
-        (at, State { losses, forces, saturation: saturation.as_ref(), errors: errors.as_ref() })
+        let (saturation, errors) = (own.saturation.as_ref(), own.errors.as_ref());
+        (at, State { frequency, losses, forces, saturation, coils, multipoles, probes, errors })
     });
     of.collect()
 }

@@ -111,7 +111,7 @@ fn a_signal_takes_the_bar_away_for_good() {
         return;
     };
     assert_eq!(code, 130, "{text}");
-    let (_, end) = text.split_once("finishing the current evaluation").expect("it is reported");
+    let (_, end) = text.split_once("finishing the current work").expect("it is reported");
     assert!(!end.contains("/5000 [") && end.contains("resume with"), "{end}");
 }
 

@@ -301,6 +301,14 @@ impl ObjectiveKind {
         matches!(self, Self::Multipole | Self::MultipoleContent)
     }
 
+    /// Whether it is a sum or mean over the cells of its region.
+    pub fn is_over_cells(self) -> bool {
+        matches!(
+            self,
+            Self::FluxDensitySquared | Self::TargetField | Self::Homogeneity | Self::FieldComponent
+        )
+    }
+
     /// Whether its `region` is one of the mesh.
     pub fn is_of_a_region(self) -> bool {
         !self.is_of_a_body() && !self.is_of_terms()
@@ -417,7 +425,7 @@ impl Functional {
             taken.contains(&0.0)
         };
         if let Some(why) = self.kind.why_not_static().filter(|_| is_void) {
-            let expected = "a frequency above 0 Hz; at 0.1 Hz a solid conductor has the loss and resistance of direct current";
+            let expected = "a frequency above 0 Hz; at 0.1 Hz a solid conductor has the resistance of direct current, and with √2 times its amperes the loss";
             section.wrong("kind", format!("`{}` is {why}", section.path()), expected);
         }
     }

@@ -2,32 +2,26 @@
 
 use maud::{Markup, html};
 
-use super::iron::under;
-use super::tables::{ERROR_BAR, MOST_ROWS, bar, titled_table};
+use super::tables::{ERROR_BAR, MOST_ROWS, bar, of_first_state, of_state, titled_table};
 use super::ticks::number;
 use crate::files::{Amplitude, CoilResult, MultipoleResult, RunResult, StateErrors};
 
-/// Terminals, inductances and coupling of coils; terms of expansions. Under several loads all but the inductances for each.
+/// Terminals, inductances and coupling of coils; terms of expansions. Of several states all but the inductances for each.
 pub(super) fn circuits(result: &RunResult) -> Markup {
     let states = &result.states;
+    let first = of_first_state(result);
     html! {
-        @if result.loads.len() > 1 {
-            @for state in states { (terminals(&state.coils, state.errors.as_ref(), state.load.as_deref())) }
-        } @else {
-            (terminals(&result.coils, result.errors.as_ref(), None))
-        }
-        (matrix("Inductances [H]", &result.inductance_h, result))
-        @if result.coils.len() > 1 { (matrix("Coupling", &result.coupling, result)) }
-        @if result.loads.len() > 1 {
-            @for state in states { (expansions(&state.multipoles, state.errors.as_ref(), state.load.as_deref())) }
-        } @else {
-            (expansions(&result.multipoles, result.errors.as_ref(), None))
-        }
+        @for state in states { (terminals(&state.coils, state.errors.as_ref(), &of_state(state))) }
+        @if states.is_empty() { (terminals(&result.coils, result.errors.as_ref(), "")) }
+        (matrix(&format!("Inductances [H]{first}"), &result.inductance_h, result))
+        @if result.coils.len() > 1 { (matrix(&format!("Coupling{first}"), &result.coupling, result)) }
+        @for state in states { (expansions(&state.multipoles, state.errors.as_ref(), &of_state(state))) }
+        @if states.is_empty() { (expansions(&result.multipoles, result.errors.as_ref(), "")) }
     }
 }
 
 /// What the terminals of coils see.
-fn terminals(coils: &[CoilResult], errors: Option<&StateErrors>, load: Option<&str>) -> Markup {
+fn terminals(coils: &[CoilResult], errors: Option<&StateErrors>, state: &str) -> Markup {
     let row = |coil: &CoilResult| {
         let behind = |error: Option<&f64>| error.map_or(String::new(), |_| format!(" {}", bar(error, 1.0)));
         let of_current = behind(errors.and_then(|errors| errors.currents_a.get(&coil.name)));
@@ -43,15 +37,15 @@ fn terminals(coils: &[CoilResult], errors: Option<&StateErrors>, load: Option<&s
     };
     let rows: Vec<Vec<String>> = coils.iter().map(row).collect();
     let head = ["coil", "current", "flux linkage", ERROR_BAR, "resistance", "voltage"];
-    titled_table(&format!("Coils of the meshed part{}", under(load)), &head, &rows, MOST_ROWS)
+    titled_table(&format!("Coils of the meshed part{state}"), &head, &rows, MOST_ROWS)
 }
 
 /// The terms of expansions.
-fn expansions(sets: &[MultipoleResult], errors: Option<&StateErrors>, load: Option<&str>) -> Markup {
+fn expansions(sets: &[MultipoleResult], errors: Option<&StateErrors>, state: &str) -> Markup {
     html! {
         @for set in sets {
             (titled_table(
-                &format!("Expansion {}, at {} mm{}", set.name, number(1e3 * set.radius_m, 4), under(load)),
+                &format!("Expansion {}, at {} mm{state}", set.name, number(1e3 * set.radius_m, 4)),
                 &["term", "value", ERROR_BAR, "units of 1e-4"],
                 &set.terms.iter().map(|term| {
                     let units = term.units.map_or(String::new(), |units| number(units, 5));

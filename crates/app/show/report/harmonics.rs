@@ -5,6 +5,7 @@ use maud::{Markup, html};
 
 use super::bars::{self, Row};
 use super::plot::svg;
+use super::tables::of_first_state;
 use super::ticks::number;
 use crate::build::multipole::main_terms;
 use crate::config::Config;
@@ -22,7 +23,7 @@ pub(super) fn figures(config: &Config, result: &RunResult) -> Markup {
                     (draw(&after.name, &shown))
                     figcaption {
                         "Terms of the expansion " (after.name) " at " (number(1e3 * after.radius_m, 4))
-                        " mm in units of 1e-4 of " (main.join(", "))
+                        " mm in units of 1e-4 of " (main.join(", ")) (of_first_state(result))
                         @if before.get(k).is_some() { ": before above, after below." } @else { "." }
                     }
                 }

@@ -12,7 +12,7 @@ use super::field_cut::{CutTriangle, FieldCut};
 use super::markup::{Card, note, table};
 use super::picture::Picture;
 use super::plot::path;
-use super::tables::{ERROR_BAR, bar};
+use super::tables::{ERROR_BAR, bar, of_first_state};
 use super::ticks::{Count, number, trim_zeros};
 use super::window::Window;
 use crate::build::Outline;
@@ -24,24 +24,25 @@ const MOST_CARDS: usize = 2;
 /// The figures that the head of the page shows: forces, and the highest flux density in iron.
 pub(super) fn cards(data: &RunData) -> Vec<Card> {
     let Some(result) = &data.result else { return Vec::new() };
+    let state = of_first_state(result);
     // Of a body that planes of symmetry cut, components cancel which its size would hide.
     let of_body = |body: &BodyForce| {
         let [x, y, z] = body.force_n.map(|component| number(component, 3));
-        ("force", format!("({x}, {y}, {z}) N"), format!("on {}, of the meshed part", body.name))
+        ("force", format!("({x}, {y}, {z}) N"), format!("on {}, of the meshed part{state}", body.name))
     };
     let mut cards: Vec<Card> = result.forces.iter().take(MOST_CARDS).map(of_body).collect();
     let regions = result.saturation.iter().flat_map(|saturation| &saturation.regions);
     let highest = regions.max_by(|a, b| a.highest_b_t.total_cmp(&b.highest_b_t));
     cards.extend(highest.map(|region| {
         let end = region.table_ends_b_t.map(|end| format!(", whose curve ends at {} T", trim_zeros(end, 3)));
-        let remark = format!("in {}{}", region.region, end.unwrap_or_default());
+        let remark = format!("in {}{}{state}", region.region, end.unwrap_or_default());
         ("highest B in iron", format!("{} T", number(region.highest_b_t, 3)), remark)
     }));
     cards
 }
 
-/// Forces and torques on every body; nothing where there are none.
-pub(super) fn forces(forces: &[BodyForce], errors: Option<&StateErrors>, load: Option<&str>) -> Markup {
+/// Forces and torques on every body, with the words for their state; nothing where there are none.
+pub(super) fn forces(forces: &[BodyForce], errors: Option<&StateErrors>, state: &str) -> Markup {
     let row = |body: &BodyForce| {
         let own = errors.and_then(|errors| errors.forces.get(&body.name));
         let bars = [own.map(|own| &own.force_n), own.map(|own| &own.torque_nm)].map(|error| bar(error, 1.0));
@@ -58,19 +59,14 @@ pub(super) fn forces(forces: &[BodyForce], errors: Option<&StateErrors>, load: O
         ["body", "Fx [N]", "Fy [N]", "Fz [N]", ERROR_BAR, "Mx [N m]", "My [N m]", "Mz [N m]", ERROR_BAR];
     html! {
         @if !rows.is_empty() {
-            h3 { "Forces and torques on the part that is modelled" (under(load)) }
+            h3 { "Forces and torques on the part that is modelled" (state) }
             (table(&head, &rows, None))
         }
     }
 }
 
-/// What stands behind the title of a table of one load.
-pub(super) fn under(load: Option<&str>) -> String {
-    load.map_or(String::new(), |load| format!(", under the load {load}"))
-}
-
 /// How far every region goes into its curve; nothing where all is linear.
-pub(super) fn saturation(saturation: Option<&SaturationResult>, load: Option<&str>) -> Markup {
+pub(super) fn saturation(saturation: Option<&SaturationResult>, state: &str) -> Markup {
     let row = |region: &SaturatedRegion| {
         let tesla = |b: Option<f64>| b.map_or("–".to_owned(), |b| number(b, 4));
         vec![
@@ -92,7 +88,7 @@ pub(super) fn saturation(saturation: Option<&SaturationResult>, load: Option<&st
     ];
     html! {
         @if let Some(saturation) = saturation {
-            h3 { "Saturation" (under(load)) }
+            h3 { "Saturation" (state) }
             (table(&head, &saturation.regions.iter().map(row).collect::<Vec<_>>(), None))
             (note(&format!(
                 "Newton's method took {} steps. Beyond the knee the differential permeability is below a tenth of its largest.",

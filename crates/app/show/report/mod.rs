@@ -3,7 +3,7 @@
 //! `data` reads the directory (fields by `field_file`), `page` puts the sections in their order, and the others show one
 //! thing each: `head`, `map`, `field`, `iron`, `error_map`, `convergence`, `histogram`, `surface`, `tables`, `facts`, `files`. Underneath are
 //! `plot` (axes), `bars`, `frame` and `picture` (to scale), `ticks` (numbers), `colour`, `raster` and `png` (images), `window`,
-//! `field_cut`, `cut`, `coils` and `plane` (geometry), `observed` (what the objective is taken over), `words` (the
+//! `field_cut`, `cut`, `coils`, `moment` and `plane` (geometry), `observed` (what the objective is taken over), `words` (the
 //! configuration in plain words), `markup` (what the pages of this program share). The page holds its style and its script
 //! (`style.css`, `view.js`), asks no network, and says nothing of the moment at which it is made: equal directories make
 //! equal pages.
@@ -31,6 +31,7 @@ mod histogram;
 mod iron;
 mod map;
 pub(crate) mod markup;
+mod moment;
 mod observed;
 mod page;
 mod picture;

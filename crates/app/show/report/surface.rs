@@ -12,7 +12,8 @@ use serde_json::{Value, json};
 use super::colour::ColourMap;
 use super::cut::NodeMeans;
 use super::data::{RunData, Snapshot};
-use super::map::{SurfaceValues, view_normal};
+use super::map::{SurfaceValues, is_along_normals, view_normal};
+use super::moment::{Moment, place};
 use super::plane::{bounds, extremes, mirrors, with_room};
 use super::ticks::Count;
 use crate::build::{Outline, OutlinedDesign};
@@ -73,7 +74,7 @@ impl Surface {
         let mut nodes: Vec<NodeId> = triangles.iter().flatten().copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
-        let places = places(data, outline, design, &nodes)?;
+        let places = places_before_and_after(data, outline, design, &nodes)?;
         let span = |points: &[Point]| {
             let [low, high] = bounds(points.iter().copied());
             norm(std::array::from_fn(|d| high[d] - low[d]))
@@ -102,52 +103,32 @@ fn enlargement(motion: f64, extent: f64) -> f64 {
 /// region that its impedance surface replaces, is left out.
 fn boundary(outline: &Outline, design: &OutlinedDesign) -> (Vec<[NodeId; 3]>, String) {
     let topology = outline.full_mesh.topology();
-    let is_body = |region: RegionId| design.bodies.contains(&region);
+    let is_body = |region: RegionId| design.shown.contains(&region);
     let region_of = |e: fluxmorph_geometry::ElementId| topology.region_of()[e.index()];
     let triangles = topology.facets().iter().filter(|facet| {
         let outside = facet.outside.is_some_and(|e| is_body(region_of(e)));
         is_body(region_of(facet.inside)) != outside
             && facet.nodes.iter().all(|n| outline.node_of[n.index()].is_some())
     });
-    let names: Vec<&str> =
-        design.bodies.iter().map(|r| topology.region_names()[r.index()].as_str()).collect();
+    let names: Vec<&str> = design.shown.iter().map(|r| topology.region_names()[r.index()].as_str()).collect();
     (triangles.map(|facet| facet.nodes).collect(), names.join(" and "))
 }
 
-/// Where the nodes are before and after [m].
-fn places(
+/// Where some nodes are before and after [m]; undeformed before where nothing is known of that.
+fn places_before_and_after(
     data: &RunData,
     outline: &Outline,
     design: &OutlinedDesign,
     nodes: &[NodeId],
 ) -> Result<[Vec<Point>; 2], String> {
-    let of_field = |field: &Snapshot| -> Vec<Point> {
-        let at = |n: &NodeId| match outline.node_of[n.index()] {
-            Some(own) => field.points[own.index()],
-            None => outline.full_mesh.point(*n),
-        };
-        nodes.iter().map(at).collect()
+    let of = |moment: Moment| {
+        let place = place(data, outline, design, moment)?;
+        Some(nodes.iter().map(|n| place(*n)).collect())
     };
-    let of_design = |values: &Vec<f64>| -> Vec<Point> {
-        let displacement = design.surface.displacement(values);
-        let at = |n: &NodeId| {
-            let own = design.surface.nodes().binary_search(n).map_or([0.0; 3], |i| displacement[i]);
-            let point = outline.full_mesh.point(*n);
-            std::array::from_fn(|d| point[d] + own[d])
-        };
-        nodes.iter().map(at).collect()
-    };
-    let after = match (&data.fields[1], &data.designs[1]) {
-        (Ok(field), _) => of_field(field),
-        (_, Some(values)) => of_design(values),
-        (Err(cause), None) => return Err(cause.clone()),
-    };
-    let before = match (&data.fields[0], &data.designs[0]) {
-        (Ok(field), _) => of_field(field),
-        (_, Some(values)) => of_design(values),
-        _ => nodes.iter().map(|n| outline.full_mesh.point(*n)).collect(),
-    };
-    Ok([before, after])
+    let undeformed = || nodes.iter().map(|n| outline.full_mesh.point(*n)).collect();
+    let after =
+        of(Moment::After).ok_or_else(|| data.fields[1].as_ref().err().cloned().unwrap_or_default())?;
+    Ok([of(Moment::Before).unwrap_or_else(undeformed), after])
 }
 
 fn colourings(
@@ -158,20 +139,22 @@ fn colourings(
     places: &[Vec<Point>; 2],
 ) -> Vec<Colouring> {
     let mut all = Vec::new();
-    let surface = SurfaceValues::new(data, design);
-    if surface.is_thickness && surface.values[1].is_some() {
+    let thickness = SurfaceValues::thickness(data, outline, design).map(|surface| {
         let at = |values: &Option<Vec<Option<f64>>>| -> Vec<Option<f64>> {
             let of = |n: &NodeId| values.as_ref()?[design.surface.nodes().binary_search(n).ok()?];
             nodes.iter().map(of).collect()
         };
-        all.push(Colouring {
+        Colouring {
             name: "thickness".to_owned(),
             unit: "mm",
             map: surface.colours(),
             count: Count::Linear,
             values: surface.values.each_ref().map(at),
-        });
-    }
+        }
+    });
+    // What the map shows comes first.
+    let (first, last) = thickness.into_iter().partition::<Vec<_>, _>(|_| !is_along_normals(data));
+    all.extend(first);
     let undeformed = nodes.iter().map(|n| outline.full_mesh.point(*n));
     let undeformed: Vec<Point> = undeformed.collect();
     let motion = |points: &Vec<Point>| -> Vec<Option<f64>> {
@@ -188,6 +171,7 @@ fn colourings(
             values,
         });
     }
+    all.extend(last);
     if let Ok(after) = &data.fields[1] {
         let before = data.fields[0].as_ref().ok();
         let of = |field: &Snapshot| flux_density(outline, design, nodes, field);
@@ -214,7 +198,7 @@ fn flux_density(
     let full = outline.full_mesh.topology();
     let means = NodeMeans { topology, points: &field.points, values: &field.flux_density };
     let bodies: Vec<RegionId> =
-        design.bodies.iter().filter_map(|r| topology.region(&full.region_names()[r.index()]).ok()).collect();
+        design.shown.iter().filter_map(|r| topology.region(&full.region_names()[r.index()]).ok()).collect();
     let of = |node: &NodeId| {
         let own = outline.node_of[node.index()]?;
         let in_body = |e: &fluxmorph_geometry::ElementId| bodies.contains(&topology.region_of()[e.index()]);

@@ -10,7 +10,7 @@ use super::markup::{note, table};
 use super::ticks::{number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline, PermeabilityOf, skin_warnings};
-use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel};
+use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel, Term};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateErrors, StateResult, TermResult};
 use crate::show::Evaluation;
 
@@ -152,6 +152,19 @@ pub(super) fn words_of(load: Option<&str>, frequency: f64) -> String {
     load.map_or_else(|| hertz(frequency), str::to_owned)
 }
 
+/// What stands behind the title of what is of one of several states: its load, else its frequency.
+pub(super) fn of_state(state: &StateResult) -> String {
+    match &state.load {
+        Some(load) => format!(", under the load {load}"),
+        None => format!(", at {}", hertz(state.frequency_hz)),
+    }
+}
+
+/// The same of what is of the first state; nothing where there is only one.
+pub(super) fn of_first_state(result: &RunResult) -> String {
+    result.states.first().map(of_state).unwrap_or_default()
+}
+
 /// What the column of a state is headed with.
 fn head_of_state(result: &RunResult) -> &'static str {
     if result.loads.is_empty() { "frequency" } else { "load" }
@@ -166,14 +179,13 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
         (circuits(result))
         (harmonics::figures(&data.config, result))
         (losses(result, &states))
-        @if result.loads.len() > 1 {
-            @for state in &result.states {
-                (iron::forces(&state.forces, state.errors.as_ref(), state.load.as_deref()))
-                (iron::saturation(state.saturation.as_ref(), state.load.as_deref()))
-            }
-        } @else {
-            (iron::forces(&result.forces, result.errors.as_ref(), None))
-            (iron::saturation(result.saturation.as_ref(), None))
+        @for state in &result.states {
+            (iron::forces(&state.forces, state.errors.as_ref(), &of_state(state)))
+            (iron::saturation(state.saturation.as_ref(), &of_state(state)))
+        }
+        @if result.states.is_empty() {
+            (iron::forces(&result.forces, result.errors.as_ref(), ""))
+            (iron::saturation(result.saturation.as_ref(), ""))
         }
         (probes(result, &states))
     }
@@ -216,9 +228,15 @@ fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64
 }
 
 fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
-    let row = |t: &TermResult| {
-        let own = objective.into_iter().flat_map(Objective::terms).map(|term| &term.functional);
-        let own = own.into_iter().find(|own| own.kind.name() == t.kind);
+    let written = objective.map_or(&[][..], Objective::terms);
+    let row = |(k, t): (usize, &TermResult)| {
+        // A worst case has what is written once a load.
+        let is_own = |own: &&Term| {
+            let functional = &own.functional;
+            functional.kind.name() == t.kind && functional.region == t.region && own.weight == t.weight
+        };
+        let own = if written.len() == terms.len() { written.get(k) } else { written.iter().find(is_own) };
+        let own = own.map(|term| &term.functional);
         vec![
             t.kind.replace('_', " "),
             match (&t.region, &t.coils[..]) {
@@ -236,7 +254,7 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
             number(t.weight * t.value, 6),
         ]
     };
-    let rows: Vec<Vec<String>> = terms.iter().map(row).collect();
+    let rows: Vec<Vec<String>> = terms.iter().enumerate().map(row).collect();
     let has_loads = terms.iter().any(|term| term.load.is_some());
     let state = if has_loads { "load" } else { "frequency" };
     let head = ["term", "region", state, "weight", "value", "weighted"];

@@ -1,0 +1,170 @@
+//! What objective and constraints ask of regions, bodies, coils and loads that these cannot give.
+
+use fluxmorph_geometry::Topology;
+
+use super::super::entries::material;
+use super::super::multipole;
+use super::super::references::functionals;
+use super::density;
+use crate::config::{self, CoilShape, Config, Diagnostic, LoadCase, ObjectiveKind, RegionModel, SourceMap};
+
+/// What objective and constraints ask of regions that these cannot give.
+pub(in crate::build) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let known = |name: &&str| topology.region(name).is_ok();
+    faults.extend(body_faults(config, source));
+    faults.extend(coil_faults(config, source));
+    faults.extend(multipole::faults(config, source));
+    faults.extend(mass_faults(config, source, topology));
+    faults.extend(direct_loss_faults(config, source));
+    let is_of_a_region = |f: &config::Functional| f.kind.is_of_a_region() && f.kind.is_of_field();
+    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| is_of_a_region(f)) {
+        let Some(region) = functional.region.as_deref().filter(known) else { continue };
+        let model = config.regions.get(region).map(|entry| entry.model);
+        let is_loss = functional.kind == ObjectiveKind::Loss;
+        let (message, expected) = match model {
+            Some(RegionModel::Perfect) if is_loss => (
+                format!("`{region}` is a perfect conductor, so it has no eddy-current loss"),
+                "a region whose material conducts, with another model",
+            ),
+            _ if is_loss && material(config, region).conductivity == 0.0 => (
+                format!("`{region}` does not conduct, so it has no eddy-current loss"),
+                "a region whose material conducts",
+            ),
+            Some(RegionModel::Impedance | RegionModel::Perfect) if !is_loss => {
+                (format!("`{region}` is replaced by its surface"), "a region that is meshed, such as air")
+            }
+            _ => continue,
+        };
+        faults.push(source.diagnostic(&format!("{path}.region"), message).expected(expected));
+    }
+    faults
+}
+
+/// Losses of solid conductors under loads of which one is at 0 Hz: what a direct current loses is none of the field.
+fn direct_loss_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let losses = functionals(config).into_iter().filter(|(_, f)| f.kind == ObjectiveKind::Loss);
+    let fault = |(path, functional): (String, &config::Functional)| {
+        let region = functional.region.as_deref()?;
+        let is_own = |coil: &&config::Coil| matches!(&coil.shape, CoilShape::Region(own) if coil.is_solid() && own.region == region);
+        let coil = config.coils.iter().find(is_own)?;
+        let cases = config.load_cases();
+        let is_direct = |case: &&LoadCase<'_>| functional.is_taken_under(case) && case.frequency == 0.0;
+        let load = cases
+            .iter()
+            .find(is_direct)?
+            .name()
+            .map_or("0 Hz".to_owned(), |name| format!("the load `{name}`"));
+        let message = format!(
+            "`{path}` is taken under {load} of 0 Hz too, and what a direct current loses in the coil `{}` is not counted",
+            coil.name
+        );
+        let fault = source.diagnostic(&format!("{path}.kind"), message);
+        Some(fault.expected(
+            "`load` or `frequency` beside it, one above 0 Hz; at 0.1 Hz a solid conductor has the resistance of direct current, and with \
+             √2 times its amperes the loss",
+        ))
+    };
+    losses.filter_map(fault).collect()
+}
+
+/// Masses of regions without density.
+fn mass_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
+    let masses = functionals(config).into_iter().filter(|(_, f)| f.kind == ObjectiveKind::Mass);
+    let fault = |(path, functional): (String, &config::Functional)| {
+        let region = functional.region.as_deref().filter(|name| topology.region(name).is_ok())?;
+        if density(config, region).is_some() {
+            return None;
+        }
+        let entry = config.regions.get(region);
+        let what = if entry.is_some() { "its material has no density" } else { "it has no material" };
+        let message = format!("the mass of `{region}` is asked for, but {what}");
+        let fault = source.diagnostic(&format!("{path}.kind"), message);
+        Some(match entry {
+            Some(entry) => fault.help(format!(
+                "add a line like: density = \"7850 kg/m3\" to [materials.{}], or take the volume",
+                entry.material
+            )),
+            None => fault.expected("a region with a material, or kind = \"volume\""),
+        })
+    };
+    masses.filter_map(fault).collect()
+}
+
+/// Bodies that are not there, and bodies that are not meshed.
+fn body_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let known: Vec<&str> = config.forces.iter().map(|force| force.name.as_str()).collect();
+    for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_a_body()) {
+        let name = functional.region.as_deref().unwrap_or_default();
+        if !name.is_empty() && !known.contains(&name) {
+            faults.push(source.unknown_name(&format!("{path}.region"), "body of [[forces]]", name, &known));
+        }
+    }
+    for (k, force) in config.forces.iter().enumerate() {
+        for (i, name) in force.regions.iter().enumerate() {
+            if !config.is_meshed(name) {
+                let path = format!("forces[{k}].regions[{i}]");
+                let message = format!("`{name}` is replaced by its surface, so there is no body to displace");
+                faults.push(source.diagnostic(&path, message).expected("a region that is meshed"));
+            }
+        }
+    }
+    faults
+}
+
+/// Coils that are not there, have no winding, or are asked for what they do not have.
+fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
+    let mut faults = Vec::new();
+    let known: Vec<&str> = config.coils.iter().map(|coil| coil.name.as_str()).collect();
+    for (path, functional) in functionals(config) {
+        let kind = functional.kind.name();
+        let given: Vec<LoadCase<'_>> =
+            config.load_cases().into_iter().filter(|case| functional.is_taken_under(case)).collect();
+        for (k, name) in functional.coils.iter().flatten().enumerate() {
+            let path = format!("{path}.coils[{k}]");
+            let Some(index) = known.iter().position(|known| known == name) else {
+                faults.push(source.unknown_name(&path, "coil", name, &known));
+                continue;
+            };
+            let coil = &config.coils[index];
+            if coil.turns.is_none() {
+                let message = format!("the coil `{name}` has no turns, so there is no {kind} of it");
+                let help = format!("add a line like: turns = 10 to coils[{index}]");
+                faults.push(source.diagnostic(&path, message).help(help));
+            } else if functional.kind == ObjectiveKind::Current
+                && let Some(case) = given.iter().find(|case| !case.feed(coil).by_voltage)
+            {
+                let under = case.name().map_or(String::new(), |load| format!(" under the load `{load}`"));
+                let message =
+                    format!("the current of the coil `{name}` is given{under}: no shape changes it");
+                faults.push(source.diagnostic(&path, message).expected("a coil that a voltage drives"));
+            } else if functional.kind == ObjectiveKind::PowerFactor
+                && let Some(case) = given.iter().find(|case| {
+                    let feed = case.feed(coil);
+                    feed.by_voltage && feed.amplitude == 0.0
+                })
+            {
+                let under = case.name().map_or(String::new(), |load| format!(" under the load `{load}`"));
+                let message = format!(
+                    "the coil `{name}` is short-circuited{under}: no power comes in, of which a part could be real"
+                );
+                let fault = source.diagnostic(&path, message);
+                faults.push(
+                    fault.expected("a coil with a current or a voltage; `load` chooses one of several loads"),
+                );
+            }
+        }
+        let is_of_inductances = functional.coils.is_some()
+            && !matches!(functional.kind, ObjectiveKind::FluxLinkage)
+            && functional.kind.may_be_static();
+        if is_of_inductances && config.saturating_region().is_some() {
+            let message = format!(
+                "`{path}` is of inductances, which a B–H curve does not have: they depend on the current"
+            );
+            let fault = source.diagnostic(&format!("{path}.kind"), message);
+            faults.push(fault.expected("flux_linkage, or materials with a permeability"));
+        }
+    }
+    faults
+}
