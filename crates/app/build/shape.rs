@@ -342,8 +342,7 @@ fn vanishing_faults(
         let share = spent.map(|(left, (i, thickness))| (thickness / (thickness - left), i, thickness));
         let Some((share, i, thickness)) = share.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
         let message = format!(
-            "`{key}` is {:.3} mm, and at {} the body is {:.3} mm thick along the design's direction: with all variables there \
-             nothing would be left of it",
+            "`{key}` is {:.3} mm, and at {} the body is {:.3} mm thick along the design's direction: nothing would be left of it",
             Millimetres(bound),
             millimetres(mesh.point(surface.nodes()[i])),
             Millimetres(thickness)
