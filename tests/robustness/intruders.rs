@@ -89,7 +89,8 @@ fn a_directory_that_is_moved_meanwhile_is_gone_on_with_elsewhere() {
         .and_then(|()| std::fs::write(out.join("result.json"), "another's"))
         .expect("written");
     assert_eq!(end_of(&mut run).code(), Some(5));
-    assert_eq!(files(&out).len(), 1);
+    let files_there = files(&out);
+    assert!(files_there.len() == 1 && std::fs::read(out.join("result.json")).expect("there") == b"another's");
     // The configuration may have gone as well: the run has its own.
     std::fs::remove_file(&device.config).expect("removed");
     finish(&mut resume(&moved)).completed();

@@ -1,5 +1,6 @@
 //! The mesh of a configuration with its cells divided where the device is.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use fluxmorph_geometry::generate::{
@@ -10,9 +11,9 @@ use fluxmorph_geometry::tet4::{Point, centroid, norm, sub};
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_optimizer::problem::Problem;
 
-use super::mesh::named_interfaces;
+use super::mesh::{build, named_interfaces};
+use super::open;
 use super::references::functionals;
-use super::{build_mesh, open};
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 
@@ -65,21 +66,26 @@ impl DividedMesh {
             Self::Boxes(parameters) => boxes(parameters),
             Self::Sphere(parameters) => sphere(parameters),
         }?;
-        let measured = functionals(config).into_iter().filter(|(_, own)| own.kind.is_over_cells());
+        let measured = functionals(config).into_iter().filter(|(_, own)| own.is_over_cells());
         let is_one_of_elements = |name: &&str| mesh.topology().given_cells(name).is_none();
-        let names: Vec<&str> =
+        let names: BTreeSet<&str> =
             measured.filter_map(|(_, own)| own.region.as_deref()).filter(is_one_of_elements).collect();
         let mesh =
-            if names.is_empty() { mesh } else { with_cells_of(&build_mesh(config, source)?, &mesh, &names)? };
+            if names.is_empty() { mesh } else { with_cells_of(&build(config, source)?.mesh, &mesh, names)? };
         open::with_shell(named_interfaces(mesh, config)?, config, source)
     }
 }
 
 /// The divided mesh with the cells that a coarser one has in regions of which every element is one: a sum over cells has the same
 /// terms then. An element belongs to the one that its centroid is in; beside a round face, to the nearest.
-fn with_cells_of(coarse: &Mesh, mesh: &Mesh, names: &[&str]) -> Result<Mesh, MeshError> {
+fn with_cells_of(
+    coarse: &Mesh,
+    mesh: &Mesh,
+    names: impl IntoIterator<Item = impl AsRef<str>>,
+) -> Result<Mesh, MeshError> {
     let mut topology = mesh.topology().as_ref().clone();
     for name in names {
+        let name = name.as_ref();
         let own = coarse.topology().elements_of(coarse.topology().region(name)?);
         let places: Vec<Point> = own.iter().map(|&e| centroid(coarse.vertices(e))).collect();
         let nearest = |point: Point| {
@@ -142,7 +148,7 @@ mod tests {
         };
         let coarse = boxes(&parameters(None)).expect("a box");
         let fine = boxes(&parameters(Some(Division { inside: observed, parts: 2 }))).expect("a finer box");
-        let fine = with_cells_of(&coarse, &fine, &["observed"]).expect("cells");
+        let fine = with_cells_of(&coarse, &fine, ["observed"]).expect("cells");
         let of =
             |mesh: &Mesh| mesh.topology().cells_of(mesh.topology().region("observed").expect("a region"));
         let volume_of =

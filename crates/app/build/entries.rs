@@ -28,6 +28,11 @@ pub(crate) fn is_wound(config: &Config, region: &str) -> bool {
     config.coils.iter().any(of)
 }
 
+/// Mass density [kg/m³] of a region's material, if it is given.
+pub(super) fn density(config: &Config, region: &str) -> Option<f64> {
+    config.materials.get(&config.regions.get(region)?.material)?.density
+}
+
 /// Whether a region is air to the field: of no other material, no magnet, and none that a surface stands for.
 pub(crate) fn is_air(config: &Config, region: &str) -> bool {
     let is_meshed = config.regions.get(region).is_none_or(|own| own.model == RegionModel::Volume);

@@ -16,6 +16,7 @@ use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_solver::functional::{self, AtTerminals, Follow, Inductive, Observed, Volume, Weighting};
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
+use super::entries::density;
 use super::references::{functionals, regions};
 use super::shape::may_move;
 use crate::config::{
@@ -34,11 +35,6 @@ pub(crate) fn with_cells_written_down(config: &Config, mesh: &Mesh) -> Result<Me
         }
     }
     Mesh::new(Arc::new(topology), mesh.points().to_vec())
-}
-
-/// Mass density [kg/m³] of a region's material, if it is given.
-fn density(config: &Config, region: &str) -> Option<f64> {
-    config.materials.get(&config.regions.get(region)?.material)?.density
 }
 
 /// The objective on the states of a configuration.

@@ -6,7 +6,7 @@ use super::args::GradientArgs;
 use super::ranks::on_all;
 use super::{interrupt, stdout};
 use crate::build::{Mode, check_on_ranks, memory_limit, set_up_watched};
-use crate::config::FactorReuse;
+use crate::config::{Config, FactorReuse, Region};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::read_design;
@@ -51,17 +51,31 @@ pub(super) fn gradient(args: &GradientArgs) -> Result<ExitCode, Error> {
             })?;
         // No bar may stand where the table goes.
         drop(observer);
-        let has_table = config.saturating_region().is_some()
-            && config.materials.values().any(|material| material.bh.is_some() || material.bh_file.is_some());
-        print(&certificates, &settings, (work.json, has_table))
+        print(&certificates, &settings, work.json, cause_of_differences(&config))
     })
 }
 
-/// Prints the certificates, as JSON or as tables; what may be to blame is said where a B–H curve is a table.
+/// What may take digits from the differences of a right gradient.
+fn cause_of_differences(config: &Config) -> &'static str {
+    let has_table = |region: &Region| {
+        config.materials.get(&region.material).is_some_and(|own| own.bh.is_some() || own.bh_file.is_some())
+    };
+    if config.regions.values().any(has_table) {
+        "differences lose digits where elements cross a point of a B–H table, at which the curve's second derivative jumps, and by what \
+         the residual of the linear solver leaves. A curve in closed form (materials.NAME.saturation) or \
+         analysis.linear_solver.tolerance = 1e-14 tells"
+    } else {
+        "what the residual of the linear solver leaves of differences may be larger than they are, and \
+         analysis.linear_solver.tolerance = 1e-14 tells"
+    }
+}
+
+/// Prints the certificates, as JSON or as tables.
 fn print(
     certificates: &Certificates,
     settings: &Settings,
-    (json, has_table): (bool, bool),
+    json: bool,
+    cause_of_differences: &str,
 ) -> Result<ExitCode, Error> {
     let constraints = certificates.constraints.iter().map(|named| (&named.certificate, named.name.as_str()));
     let all: Vec<(&Certificate, &str)> =
@@ -78,15 +92,10 @@ fn print(
     };
     let is_of_second_order =
         certificate.directions.iter().all(|direction| direction.slope >= settings.least_slope);
-    let cure = if is_of_second_order && has_table {
-        "; the slope is that of a right gradient: differences lose digits where elements cross a point of a B–H table, at which the \
-         curve's second derivative jumps, and by what the residual of the linear solver leaves. A curve in closed form \
-         (materials.NAME.saturation) or analysis.linear_solver.tolerance = 1e-14 tells"
-    } else if is_of_second_order {
-        "; the slope is that of a right gradient: what the residual of the linear solver leaves of differences may be larger than they \
-         are, and analysis.linear_solver.tolerance = 1e-14 tells"
+    let cure = if is_of_second_order {
+        format!("; the slope is that of a right gradient: {cause_of_differences}")
     } else {
-        ""
+        String::new()
     };
     Err(Error::Certificate {
         cause: format!(

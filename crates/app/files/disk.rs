@@ -11,8 +11,6 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::io::read_at_most;
 
-use super::synced::folder_of;
-
 /// Operations on files and folders. All but [`Disk::read`] and [`Disk::names`] change something, and all fail where the
 /// operating system refuses; what else they fail with stands with them.
 pub trait Disk: Debug + Send + Sync {
@@ -90,22 +88,31 @@ struct Locked {
 
 impl DiskLock for Locked {
     fn is_replaced(&self, folder: &Path, file: &Path) -> bool {
-        let differs = |held: &File, path: &Path| !held.metadata().is_ok_and(|own| is_same(&own, path));
-        self.folder.as_ref().is_some_and(|held| differs(held, folder)) && differs(&self.file, file)
+        let is_other = |held: &File, path: &Path| held.metadata().is_ok_and(|own| is_other(&own, path));
+        // A folder that may not be read is judged by the file alone.
+        self.folder.as_ref().is_none_or(|held| is_other(held, folder)) && is_other(&self.file, file)
     }
 }
 
-/// Whether an entry is what lies at a path; other systems than Unix do not let go of what is open.
-#[cfg(unix)]
-fn is_same(entry: &fs::Metadata, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let place = |entry: &fs::Metadata| (entry.dev(), entry.ino());
-    fs::metadata(path).is_ok_and(|there| place(&there) == place(entry))
+/// Whether nothing lies at a path, or another entry. What cannot be looked at is taken for the same.
+fn is_other(entry: &fs::Metadata, path: &Path) -> bool {
+    match fs::metadata(path) {
+        Ok(there) => differ(entry, &there),
+        Err(error) => error.kind() == io::ErrorKind::NotFound,
+    }
 }
 
+#[cfg(unix)]
+fn differ(entry: &fs::Metadata, other: &fs::Metadata) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let place = |entry: &fs::Metadata| (entry.dev(), entry.ino());
+    place(entry) != place(other)
+}
+
+/// Other systems do not let go of what is open.
 #[cfg(not(unix))]
-fn is_same(_: &fs::Metadata, path: &Path) -> bool {
-    path.exists()
+fn differ(_: &fs::Metadata, _: &fs::Metadata) -> bool {
+    false
 }
 
 /// A file that is written.
@@ -161,7 +168,10 @@ impl Disk for SystemDisk {
             Sharing::Shared => file.try_lock_shared(),
         };
         match locked {
-            Ok(()) => Ok(Some(Box::new(Locked { file, folder: File::open(folder_of(path)).ok() }))),
+            Ok(()) => Ok(Some(Box::new(Locked {
+                file,
+                folder: path.parent().and_then(|folder| File::open(folder).ok()),
+            }))),
             Err(TryLockError::WouldBlock) => Err(io::ErrorKind::ResourceBusy.into()),
             Err(TryLockError::Error(_)) => Ok(None),
         }

@@ -43,7 +43,7 @@ pub use result::{
     ConstraintResult, DesignResult, HomogeneityResult, LinearSolverResult, MeshResult, ObjectiveResult,
     OpenResult, RunResult, TermResult, Verification, VerificationMesh,
 };
-pub(crate) use run_directory::LOCK;
+pub(crate) use run_directory::{LOCK, check_place};
 pub use run_directory::{OverwritePolicy, RunDirectory};
 pub use state_result::{
     Amplitude, CoilResult, ForceError, HarmonicResult, MultipoleResult, ProbeResult, SaturatedRegion,
@@ -102,7 +102,7 @@ pub enum OutputError {
     /// The folder in which a run began is another one, or gone.
     #[error(
         "`{path}` is no longer the folder in which this run began: it was moved, removed or replaced meanwhile, and nothing is \
-         written into what is there now. Where it was moved to, `fluxmorph resume` goes on there"
+         written into what is there now. Where it was moved to, a run goes on with `fluxmorph resume`"
     )]
     Replaced { path: PathBuf },
     /// A folder of a run is a link.

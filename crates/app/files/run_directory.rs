@@ -56,6 +56,19 @@ fn is_no_directory(error: &OutputError) -> bool {
     matches!(error, OutputError::Io { source, .. } if source.kind() == io::ErrorKind::NotADirectory)
 }
 
+/// Refuses to go on in a folder that is another one than that of a lock.
+///
+/// # Errors
+/// [`OutputError::Replaced`].
+pub(crate) fn check_place(lock: Option<&dyn DiskLock>, folder: &Path) -> Result<(), OutputError> {
+    match lock {
+        Some(lock) if lock.is_replaced(folder, &folder.join(LOCK)) => {
+            Err(OutputError::Replaced { path: folder.to_owned() })
+        }
+        _ => Ok(()),
+    }
+}
+
 impl RunDirectory {
     /// Make the folder ready: it is absent, empty, or holds an earlier run that may be replaced.
     ///
@@ -129,12 +142,7 @@ impl RunDirectory {
     /// # Errors
     /// [`OutputError::Replaced`].
     pub fn check_place(&self) -> Result<(), OutputError> {
-        match &self.lock {
-            Some(lock) if lock.is_replaced(&self.path, &self.path.join(LOCK)) => {
-                Err(OutputError::Replaced { path: self.path.clone() })
-            }
-            _ => Ok(()),
-        }
+        check_place(self.lock.as_deref(), &self.path)
     }
 
     fn at(disk: &Arc<dyn Disk>, path: &Path) -> Self {

@@ -68,7 +68,7 @@ pub(super) struct LeftOut(Vec<OfState>);
 struct OfState {
     /// Losses of surfaces and what they leave out, by region [W].
     losses: BTreeMap<String, [f64; 2]>,
-    /// The one coil, where it alone excites the field: then all losses are its.
+    /// The one coil, where it alone excites the field: then all losses are its. Of others the currents are taken as they are.
     coil: Option<OneCoil>,
 }
 

@@ -325,13 +325,13 @@ impl Session<'_> {
         let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
         if let Err(error) = &outcome
             && self.command == "run"
-            && self.is_worth_resuming(error)
+            && let Some(evaluations) = self.worth_resuming(error)
         {
             let command = resume_command(self.directory.path());
-            let kept = match Journal::read_records(&self.directory).map_or(0, |records| records.len()) {
+            let kept = match evaluations {
                 0 => "no evaluation was kept".to_owned(),
                 1 => "one evaluation is kept".to_owned(),
-                kept => format!("{kept} evaluations are kept"),
+                _ => format!("{evaluations} evaluations are kept"),
             };
             observer.warning(&format!("{kept}: resume with `{command}`"));
         }
@@ -346,13 +346,15 @@ impl Session<'_> {
         Ok(Concluded { result, directory: self.directory, is_saved: loss.is_none() })
     }
 
-    /// Whether a run that ended with an error can be resumed: what fails in the first evaluation fails in it again.
-    fn is_worth_resuming(&self, error: &Error) -> bool {
-        let has_evaluations =
-            || Journal::read_records(&self.directory).is_ok_and(|records| !records.is_empty());
-        error.is_resumable()
-            && self.directory.holds_configuration()
-            && (error.exit_code() != ExitCode::Numerical || has_evaluations())
+    /// How many evaluations of a run that ended with an error are there to be resumed; `None` where it cannot be: what fails in the
+    /// first evaluation fails in it again.
+    fn worth_resuming(&self, error: &Error) -> Option<usize> {
+        if !error.is_resumable() || self.directory.check_place().is_err() {
+            return None;
+        }
+        let evaluations = Journal::read_records(&self.directory).map_or(0, |records| records.len());
+        let is_worth = error.exit_code() != ExitCode::Numerical || evaluations > 0;
+        (is_worth && self.directory.holds_configuration()).then_some(evaluations)
     }
 
     fn write_configuration(&self) -> Result<(), Error> {

@@ -2,11 +2,12 @@
 
 use fluxmorph_geometry::Topology;
 
-use super::super::entries::material;
+use super::super::entries::{density, material};
 use super::super::multipole;
 use super::super::references::functionals;
-use super::density;
-use crate::config::{self, CoilShape, Config, Diagnostic, LoadCase, ObjectiveKind, RegionModel, SourceMap};
+use crate::config::{
+    self, ABOVE_ZERO_HERTZ, CoilShape, Config, Diagnostic, LoadCase, ObjectiveKind, RegionModel, SourceMap,
+};
 
 /// What objective and constraints ask of regions that these cannot give.
 pub(in crate::build) fn faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
@@ -49,21 +50,17 @@ fn direct_loss_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
         let is_own = |coil: &&config::Coil| matches!(&coil.shape, CoilShape::Region(own) if coil.is_solid() && own.region == region);
         let coil = config.coils.iter().find(is_own)?;
         let cases = config.load_cases();
-        let is_direct = |case: &&LoadCase<'_>| functional.is_taken_under(case) && case.frequency == 0.0;
-        let load = cases
-            .iter()
-            .find(is_direct)?
-            .name()
-            .map_or("0 Hz".to_owned(), |name| format!("the load `{name}`"));
+        let is_direct = |case: &&LoadCase<'_>| {
+            functional.is_taken_under(case) && case.frequency == 0.0 && case.feed(coil).amplitude != 0.0
+        };
+        let case = cases.iter().find(is_direct)?;
         let message = format!(
-            "`{path}` is taken under {load} of 0 Hz too, and what a direct current loses in the coil `{}` is not counted",
+            "`{path}` is taken at 0 Hz too{}, and what a direct current loses in the coil `{}` is not counted",
+            case.words(),
             coil.name
         );
         let fault = source.diagnostic(&format!("{path}.kind"), message);
-        Some(fault.expected(
-            "`load` or `frequency` beside it, one above 0 Hz; at 0.1 Hz a solid conductor has the resistance of direct current, and with \
-             √2 times its amperes the loss",
-        ))
+        Some(fault.expected(format!("`load` or `frequency` beside it, of one {ABOVE_ZERO_HERTZ}")))
     };
     losses.filter_map(fault).collect()
 }
@@ -135,19 +132,16 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
             } else if functional.kind == ObjectiveKind::Current
                 && let Some(case) = given.iter().find(|case| !case.feed(coil).by_voltage)
             {
-                let under = case.name().map_or(String::new(), |load| format!(" under the load `{load}`"));
                 let message =
-                    format!("the current of the coil `{name}` is given{under}: no shape changes it");
+                    format!("the current of the coil `{name}` is given{}: no shape changes it", case.words());
                 faults.push(source.diagnostic(&path, message).expected("a coil that a voltage drives"));
             } else if functional.kind == ObjectiveKind::PowerFactor
-                && let Some(case) = given.iter().find(|case| {
-                    let feed = case.feed(coil);
-                    feed.by_voltage && feed.amplitude == 0.0
-                })
+                && let Some(case) = given.iter().find(|case| case.feed(coil).amplitude == 0.0)
             {
-                let under = case.name().map_or(String::new(), |load| format!(" under the load `{load}`"));
+                let state = if case.feed(coil).by_voltage { "short-circuited" } else { "open" };
                 let message = format!(
-                    "the coil `{name}` is short-circuited{under}: no power comes in, of which a part could be real"
+                    "the coil `{name}` is {state}{}: no power comes in, of which a part could be real",
+                    case.words()
                 );
                 let fault = source.diagnostic(&path, message);
                 faults.push(

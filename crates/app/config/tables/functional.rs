@@ -218,6 +218,10 @@ choice! {
     }
 }
 
+/// What stands behind `a frequency` where a direct current has nothing to offer.
+pub(crate) const ABOVE_ZERO_HERTZ: &str = "above 0 Hz; at 0.1 Hz a solid conductor has the resistance of direct current, and with √2 \
+     times its amperes the loss";
+
 impl ObjectiveKind {
     /// Whether the cells are weighted.
     fn sums_over_cells(self) -> bool {
@@ -425,9 +429,18 @@ impl Functional {
             taken.contains(&0.0)
         };
         if let Some(why) = self.kind.why_not_static().filter(|_| is_void) {
-            let expected = "a frequency above 0 Hz; at 0.1 Hz a solid conductor has the resistance of direct current, and with √2 times its amperes the loss";
+            let expected = format!("a frequency {ABOVE_ZERO_HERTZ}");
             section.wrong("kind", format!("`{}` is {why}", section.path()), expected);
         }
+    }
+
+    /// Whether it is a sum or mean over the cells of its region.
+    pub fn is_over_cells(&self) -> bool {
+        let kind = self.kind;
+        matches!(
+            kind,
+            ObjectiveKind::FluxDensitySquared | ObjectiveKind::TargetField | ObjectiveKind::Homogeneity
+        ) && self.weighting != Some(Weighting::Volume)
     }
 
     /// Unit of its values.

@@ -90,6 +90,11 @@ impl LoadCase<'_> {
         self.load.map(|(_, load)| load.name.as_str())
     }
 
+    /// The words behind what is of it: ` under the load `NAME``; nothing where there are no loads.
+    pub fn words(&self) -> String {
+        self.name().map_or_else(String::new, |load| format!(" under the load `{load}`"))
+    }
+
     /// How a coil is fed.
     pub fn feed(&self, coil: &Coil) -> Feed {
         let own = |values: fn(&Load) -> &BTreeMap<String, f64>| {

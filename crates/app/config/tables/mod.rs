@@ -40,6 +40,7 @@ pub use constraint::{Constraint, Limit, ValueBound};
 pub use constraint_kind::ThicknessKind;
 pub use design::{Design, DesignDirection, DirectionWord, RimMotion, SymmetryPlane};
 pub use force::ForceBody;
+pub(crate) use functional::ABOVE_ZERO_HERTZ;
 pub use functional::{Compared, Follow, Functional, ObjectiveKind, Weighting};
 pub use initial::{InitialDesign, RandomDesign};
 pub use linear_solver::{FactorReuse, LinearSolver, SolverMethod};

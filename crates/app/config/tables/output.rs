@@ -22,7 +22,7 @@ table! {
     /// The fresh mesh of `verify_refinement` has every line of the run's, and new ones between them over the box around all that
     /// moves and all that the objective is taken over; with the generator `sphere` all of it is finer. It shares with the run
     /// the size of the box, the far cells, materials, conditions, elements and their order, and the model of every region: an
-    /// error of these is in both ratios. So it does the cells of what is observed: where a region has none given, these are the
+    /// error of these is in both ratios. It shares the cells of what is observed, too: where a region has none given, these are the
     /// elements of the run's mesh.
     /// Variables of a control grid are the same there; without a grid the displacement of the design surface is interpolated on
     /// its triangles. Constraints are measured anew at both shapes; where the elements of the run are cut instead, only those

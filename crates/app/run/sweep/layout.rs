@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::{Planned, Setting, Sweep, SweepError};
 use crate::error::Error;
 use crate::files::{
-    Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, read_json, shell_word, to_json,
-    write_whole,
+    Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, check_place, read_json,
+    shell_word, to_json, write_whole,
 };
 
 /// The mark by which a directory is known as ours.
@@ -153,6 +153,7 @@ impl Layout {
 
     /// Writes a whole file of the sweep, replacing an older one.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), OutputError> {
+        check_place(self.lock.as_deref(), &self.path)?;
         write_whole(&*self.disk, &self.path.join(name), bytes)
     }
 

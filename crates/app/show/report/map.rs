@@ -23,6 +23,12 @@ const TALLEST: f64 = 300.0;
 /// Named surfaces that have a drawing each.
 const MOST_PARTS: usize = 6;
 
+/// What a triangle has across it, over its longest side, where it is seen along its edge.
+const EDGE_ON: f64 = 1e-9;
+
+/// An axis is taken for a later one that is as wide but for so much, which rounding may add.
+const WIDER: f64 = 1.001;
+
 /// Least height of a row of text, and greatest length of the text of a mark.
 const LEAST_ROW: f64 = 18.0;
 const LONGEST_MARK: f64 = 60.0;
@@ -106,7 +112,7 @@ pub(super) fn figure(data: &RunData, outline: &Outline, design: &OutlinedDesign)
     }
     let scale = Scale { low, high, count: Count::Linear, pixels: [LEFT, WIDTH - RIGHT] };
     let drawings = drawings(data, outline, design, &scale);
-    let is_hidden = drawings.iter().any(|(_, drawing)| drawing.hides_some());
+    let is_hidden = drawings.iter().any(|(_, drawing)| drawing.hides_some);
     let names = if data.is_run() { ["before", "after"] } else { ["undeformed", "the design analysed"] };
     let maps = names.into_iter().zip(&surface.values);
     let known: Vec<_> = maps.filter_map(|(name, values)| Some((name, values.as_ref()?))).collect();
@@ -140,7 +146,7 @@ fn drawings(
     let drawing = |triangles: &[[NodeId; 3]]| Drawing::new(data, outline, (design, triangles), *scale);
     let whole = drawing(&design.triangles);
     let names = data.config.design.as_ref().map_or(&[][..], |design| &design.surface);
-    if !(2..=MOST_PARTS).contains(&names.len()) || !whole.hides_some() {
+    if !(2..=MOST_PARTS).contains(&names.len()) || !whole.hides_some {
         return vec![(String::new(), whole)];
     }
     let triangles_of = |name: &String| outline.full_mesh.topology().surface(name).ok();
@@ -173,10 +179,16 @@ impl Drawn {
 
     /// Whether it lies before a place that is this near.
     fn hides(&self, [x, y]: [f64; 2], nearness: f64) -> bool {
+        if self.nearness <= nearness {
+            return false;
+        }
         let [a, b, c] = self.corners;
         let turn = |p: [f64; 2], q: [f64; 2]| (q[0] - p[0]) * (y - p[1]) - (q[1] - p[1]) * (x - p[0]);
         let turns = [turn(a, b), turn(b, c), turn(c, a)];
-        self.nearness > nearness && (turns.iter().all(|t| *t > 0.0) || turns.iter().all(|t| *t < 0.0))
+        let sides = [(a, b), (b, c), (c, a)].map(|(p, q)| (q[0] - p[0]).powi(2) + (q[1] - p[1]).powi(2));
+        // Seen along its edge it hides nothing, whatever rounding says.
+        let least = EDGE_ON * sides.into_iter().fold(0.0, f64::max);
+        turns.iter().all(|t| *t > least) || turns.iter().all(|t| *t < -least)
     }
 }
 
@@ -188,6 +200,8 @@ struct Drawing {
     scale: Scale,
     frame: Frame,
     is_mirrored: bool,
+    /// Whether triangles lie before others, as far as some of them tell.
+    hides_some: bool,
 }
 
 impl Drawing {
@@ -219,19 +233,17 @@ impl Drawing {
         let corners = || triangles.iter().flat_map(|drawn| drawn.corners);
         let [u, v] = [0, 1].map(|d| extremes(corners().map(|p| p[d])));
         let frame = Frame::new([u[0], v[0]], [u[1], v[1]], TALLEST);
-        Self { plane, triangles, scale, frame, is_mirrored: !mirrors.is_empty() }
+        let mut drawing =
+            Self { plane, triangles, scale, frame, is_mirrored: !mirrors.is_empty(), hides_some: false };
+        let step = drawing.triangles.len().div_ceil(MOST_CANDIDATES).max(1);
+        drawing.hides_some = drawing.triangles.iter().step_by(step).any(|drawn| !drawing.is_seen(drawn));
+        drawing
     }
 
     /// Whether nothing lies before a triangle.
     fn is_seen(&self, drawn: &Drawn) -> bool {
         let middle = drawn.middle();
         !self.triangles.iter().any(|other| other.hides(middle, drawn.nearness))
-    }
-
-    /// Whether triangles of the model lie before others; some hundreds are looked at.
-    fn hides_some(&self) -> bool {
-        let step = self.triangles.len().div_ceil(MOST_CANDIDATES).max(1);
-        self.triangles.iter().step_by(step).any(|drawn| !self.is_seen(drawn))
     }
 
     fn draw(&self, surface: &SurfaceValues, values: &[Option<f64>], id: &str, name: &str) -> Markup {
@@ -244,7 +256,8 @@ impl Drawing {
             Some((drawn.corners, [a, b, c].map(|v| self.scale.share(v))))
         });
         let rows = (((y.pixels[0] - y.pixels[1]) / LEAST_ROW) as usize).clamp(1, 5);
-        let [least, most] = extremes(values.iter().flatten().copied());
+        let nodes = self.triangles.iter().flat_map(|drawn| drawn.nodes);
+        let [least, most] = extremes(nodes.filter_map(|n| values[n]));
         let ends = if most - least > 1e-6 * most.abs() { vec![least, most] } else { Vec::new() };
         let place = |end: f64| Some((self.middle_of(values, end)?, end));
         let marks: Vec<([f64; 2], f64)> = ends.into_iter().filter_map(place).collect();
@@ -341,7 +354,7 @@ fn seen_from(
             let area = area_vector(triangle.map(|n| outline.full_mesh.point(n)));
             (0..3).for_each(|d| across[d] += area[d].abs());
         }
-        let widest = (0..3).fold(0, |widest, d| if across[d] > 1.001 * across[widest] { d } else { widest });
+        let widest = (0..3).fold(0, |widest, d| if across[d] > WIDER * across[widest] { d } else { widest });
         std::array::from_fn(|d| f64::from(d == widest))
     })
 }
@@ -423,4 +436,19 @@ fn shares_changed(
         }
     }
     shares.map(|share| share / total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_triangle_hides_what_lies_behind_it_and_none_that_is_seen_along_its_edge() {
+        let near = Drawn { corners: [[0.0, 0.0], [3.0, 0.0], [0.0, 3.0]], nearness: 1.0, nodes: [0, 1, 2] };
+        assert!(near.hides([0.9, 0.9], 0.5) && !near.hides([0.9, 0.9], 1.5) && !near.hides([2.0, 2.0], 0.5));
+        let turned = Drawn { corners: [[0.0, 0.0], [0.0, 3.0], [3.0, 0.0]], ..near };
+        assert!(turned.hides([0.9, 0.9], 0.5), "from either side");
+        let edge_on = Drawn { corners: [[0.0, 0.0], [3.0, 1e-16], [1.5, 1e-15]], ..turned };
+        assert!(!edge_on.hides(edge_on.middle(), 0.5));
+    }
 }

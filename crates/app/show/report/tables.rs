@@ -233,7 +233,11 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
         // A worst case has what is written once a load.
         let is_own = |own: &&Term| {
             let functional = &own.functional;
-            functional.kind.name() == t.kind && functional.region == t.region && own.weight == t.weight
+            let is_at = functional.frequency.is_none_or(|own| Some(own) == t.frequency)
+                && (functional.load.is_none() || functional.load == t.load);
+            let coils = functional.coils.as_deref().unwrap_or_default();
+            let is_alike = functional.kind.name() == t.kind && own.weight == t.weight;
+            is_alike && is_at && functional.region == t.region && coils == t.coils
         };
         let own = if written.len() == terms.len() { written.get(k) } else { written.iter().find(is_own) };
         let own = own.map(|term| &term.functional);
