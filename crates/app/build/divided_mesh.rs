@@ -71,21 +71,16 @@ impl DividedMesh {
         let names: BTreeSet<&str> =
             measured.filter_map(|(_, own)| own.region.as_deref()).filter(is_one_of_elements).collect();
         let mesh =
-            if names.is_empty() { mesh } else { with_cells_of(&build(config, source)?.mesh, &mesh, names)? };
+            if names.is_empty() { mesh } else { with_cells_of(&build(config, source)?.mesh, &mesh, &names)? };
         open::with_shell(named_interfaces(mesh, config)?, config, source)
     }
 }
 
 /// The divided mesh with the cells that a coarser one has in regions of which every element is one: a sum over cells has the same
 /// terms then. An element belongs to the one that its centroid is in; beside a round face, to the nearest.
-fn with_cells_of(
-    coarse: &Mesh,
-    mesh: &Mesh,
-    names: impl IntoIterator<Item = impl AsRef<str>>,
-) -> Result<Mesh, MeshError> {
+fn with_cells_of(coarse: &Mesh, mesh: &Mesh, names: &BTreeSet<&str>) -> Result<Mesh, MeshError> {
     let mut topology = mesh.topology().as_ref().clone();
     for name in names {
-        let name = name.as_ref();
         let own = coarse.topology().elements_of(coarse.topology().region(name)?);
         let places: Vec<Point> = own.iter().map(|&e| centroid(coarse.vertices(e))).collect();
         let nearest = |point: Point| {
@@ -148,7 +143,7 @@ mod tests {
         };
         let coarse = boxes(&parameters(None)).expect("a box");
         let fine = boxes(&parameters(Some(Division { inside: observed, parts: 2 }))).expect("a finer box");
-        let fine = with_cells_of(&coarse, &fine, ["observed"]).expect("cells");
+        let fine = with_cells_of(&coarse, &fine, &BTreeSet::from(["observed"])).expect("cells");
         let of =
             |mesh: &Mesh| mesh.topology().cells_of(mesh.topology().region("observed").expect("a region"));
         let volume_of =

@@ -8,6 +8,7 @@ mod console;
 mod lines;
 mod probes;
 pub mod report;
+mod states;
 mod styles;
 mod summary;
 mod table;

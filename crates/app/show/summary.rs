@@ -1,16 +1,15 @@
 //! The end of a run, or of a single analysis, in a few lines.
 
-use std::collections::BTreeMap;
-
 use fluxmorph_optimizer::body::BodyForce;
 
+use super::states::State;
 use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
 use crate::files::{
     Accuracy, Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT,
-    MultipoleResult, ObjectiveResult, ProbeResult, RunResult, RunStatus, SAFETY, SaturatedRegion,
-    SaturationResult, StateErrors, StateResult, Verdict, Verification, VerificationMesh, WHERE_LEFT_OUT,
+    MultipoleResult, ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, StateErrors, Verdict,
+    Verification, VerificationMesh, WHERE_LEFT_OUT,
 };
 use crate::printable::printable;
 
@@ -81,7 +80,8 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
     let is_run = result.command != "solve";
     let mut rows = if is_run { run(result, named, styles) } else { analysis(result, named, styles) };
     rows.extend(result.constraints.iter().map(|constraint| constraint_row(constraint, named, styles)));
-    let states = states(result);
+    let states: Vec<(String, State<'_>)> =
+        State::all(result).into_iter().map(|state| (behind(&state), state)).collect();
     for (at, state) in &states {
         let loss = |(region, loss): (&String, &f64)| {
             let bar = bar(state.errors.and_then(|errors| errors.losses_w.get(region)), "W");
@@ -350,38 +350,13 @@ fn constraint_row(constraint: &ConstraintResult, named: &Named, styles: &Styles)
     )
 }
 
-/// What a state has.
-struct State<'a> {
-    frequency: f64,
-    losses: &'a BTreeMap<String, f64>,
-    forces: &'a [BodyForce],
-    saturation: Option<&'a SaturationResult>,
-    coils: &'a [CoilResult],
-    multipoles: &'a [MultipoleResult],
-    probes: &'a [ProbeResult],
-    errors: Option<&'a StateErrors>,
-}
-
-/// The states, with the words that tell each from the others.
-fn states(result: &RunResult) -> Vec<(String, State<'_>)> {
-    if result.states.is_empty() {
-        let RunResult { losses_w: losses, forces, coils, multipoles, probes, .. } = result;
-        let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
-        let (saturation, errors) = (result.saturation.as_ref(), result.errors.as_ref());
-        let own = State { frequency, losses, forces, saturation, coils, multipoles, probes, errors };
-        return vec![(String::new(), own)];
+/// What tells a state from the others; nothing where there are none.
+fn behind(state: &State<'_>) -> String {
+    match state.load {
+        _ if !state.is_one_of_several => String::new(),
+        Some(load) => format!(" under {}", printable(load)),
+        None => format!(" at {} Hz", state.frequency),
     }
-    let of = result.states.iter().map(|own| {
-        let StateResult { losses_w: losses, forces, coils, multipoles, probes, .. } = own;
-        let frequency = own.frequency_hz;
-        let at = match &own.load {
-            Some(load) => format!(" under {}", printable(load)),
-            None => format!(" at {frequency} Hz"),
-        };
-        let (saturation, errors) = (own.saturation.as_ref(), own.errors.as_ref());
-        (at, State { frequency, losses, forces, saturation, coils, multipoles, probes, errors })
-    });
-    of.collect()
 }
 
 /// The whole time, and the parts that took a tenth of it or more.

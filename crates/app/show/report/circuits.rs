@@ -2,26 +2,25 @@
 
 use maud::{Markup, html};
 
-use super::tables::{ERROR_BAR, MOST_ROWS, bar, of_first_state, of_state, titled_table};
+use super::tables::{ERROR_BAR, MOST_ROWS, bar, behind_title, of_first_state, titled_table};
 use super::ticks::number;
-use crate::files::{Amplitude, CoilResult, MultipoleResult, RunResult, StateErrors};
+use crate::files::{Amplitude, CoilResult, RunResult};
+use crate::show::states::State;
 
 /// Terminals, inductances and coupling of coils; terms of expansions. Of several states all but the inductances for each.
-pub(super) fn circuits(result: &RunResult) -> Markup {
-    let states = &result.states;
+pub(super) fn circuits(result: &RunResult, states: &[State<'_>]) -> Markup {
     let first = of_first_state(result);
     html! {
-        @for state in states { (terminals(&state.coils, state.errors.as_ref(), &of_state(state))) }
-        @if states.is_empty() { (terminals(&result.coils, result.errors.as_ref(), "")) }
+        @for state in states { (terminals(state)) }
         (matrix(&format!("Inductances [H]{first}"), &result.inductance_h, result))
         @if result.coils.len() > 1 { (matrix(&format!("Coupling{first}"), &result.coupling, result)) }
-        @for state in states { (expansions(&state.multipoles, state.errors.as_ref(), &of_state(state))) }
-        @if states.is_empty() { (expansions(&result.multipoles, result.errors.as_ref(), "")) }
+        @for state in states { (expansions(state)) }
     }
 }
 
 /// What the terminals of coils see.
-fn terminals(coils: &[CoilResult], errors: Option<&StateErrors>, state: &str) -> Markup {
+fn terminals(state: &State<'_>) -> Markup {
+    let errors = state.errors;
     let row = |coil: &CoilResult| {
         let behind = |error: Option<&f64>| error.map_or(String::new(), |_| format!(" {}", bar(error, 1.0)));
         let of_current = behind(errors.and_then(|errors| errors.currents_a.get(&coil.name)));
@@ -35,21 +34,22 @@ fn terminals(coils: &[CoilResult], errors: Option<&StateErrors>, state: &str) ->
             amplitude(coil.voltage_v, "V"),
         ]
     };
-    let rows: Vec<Vec<String>> = coils.iter().map(row).collect();
+    let rows: Vec<Vec<String>> = state.coils.iter().map(row).collect();
     let head = ["coil", "current", "flux linkage", ERROR_BAR, "resistance", "voltage"];
-    titled_table(&format!("Coils of the meshed part{state}"), &head, &rows, MOST_ROWS)
+    titled_table(&format!("Coils of the meshed part{}", behind_title(state)), &head, &rows, MOST_ROWS)
 }
 
 /// The terms of expansions.
-fn expansions(sets: &[MultipoleResult], errors: Option<&StateErrors>, state: &str) -> Markup {
+fn expansions(state: &State<'_>) -> Markup {
+    let behind = behind_title(state);
     html! {
-        @for set in sets {
+        @for set in state.multipoles {
             (titled_table(
-                &format!("Expansion {}, at {} mm{state}", set.name, number(1e3 * set.radius_m, 4)),
+                &format!("Expansion {}, at {} mm{behind}", set.name, number(1e3 * set.radius_m, 4)),
                 &["term", "value", ERROR_BAR, "units of 1e-4"],
                 &set.terms.iter().map(|term| {
                     let units = term.units.map_or(String::new(), |units| number(units, 5));
-                    let error = errors.and_then(|errors| errors.multipoles_t.get(&set.name)?.get(&term.name));
+                    let error = state.errors.and_then(|errors| errors.multipoles_t.get(&set.name)?.get(&term.name));
                     vec![term.name.clone(), amplitude(term.value_t, "T"), bar(error, 1.0), units]
                 }).collect::<Vec<_>>(),
                 MOST_ROWS,

@@ -12,11 +12,12 @@ use super::field_cut::{CutTriangle, FieldCut};
 use super::markup::{Card, note, table};
 use super::picture::Picture;
 use super::plot::path;
-use super::tables::{ERROR_BAR, bar, of_first_state};
+use super::tables::{ERROR_BAR, bar, behind_title, of_first_state};
 use super::ticks::{Count, number, trim_zeros};
 use super::window::Window;
 use crate::build::Outline;
-use crate::files::{SaturatedRegion, SaturationResult, StateErrors};
+use crate::files::SaturatedRegion;
+use crate::show::states::State;
 
 /// Forces of at most so many bodies have a card.
 const MOST_CARDS: usize = 2;
@@ -41,10 +42,10 @@ pub(super) fn cards(data: &RunData) -> Vec<Card> {
     cards
 }
 
-/// Forces and torques on every body, with the words for their state; nothing where there are none.
-pub(super) fn forces(forces: &[BodyForce], errors: Option<&StateErrors>, state: &str) -> Markup {
+/// Forces and torques on every body; nothing where there are none.
+pub(super) fn forces(state: &State<'_>) -> Markup {
     let row = |body: &BodyForce| {
-        let own = errors.and_then(|errors| errors.forces.get(&body.name));
+        let own = state.errors.and_then(|errors| errors.forces.get(&body.name));
         let bars = [own.map(|own| &own.force_n), own.map(|own| &own.torque_nm)].map(|error| bar(error, 1.0));
         let numbers = |vector: &[f64; 3]| vector.map(|v| number(v, 5));
         let mut row = vec![body.name.clone()];
@@ -54,19 +55,19 @@ pub(super) fn forces(forces: &[BodyForce], errors: Option<&StateErrors>, state: 
         }
         row
     };
-    let rows: Vec<Vec<String>> = forces.iter().map(row).collect();
+    let rows: Vec<Vec<String>> = state.forces.iter().map(row).collect();
     let head =
         ["body", "Fx [N]", "Fy [N]", "Fz [N]", ERROR_BAR, "Mx [N m]", "My [N m]", "Mz [N m]", ERROR_BAR];
     html! {
         @if !rows.is_empty() {
-            h3 { "Forces and torques on the part that is modelled" (state) }
+            h3 { "Forces and torques on the part that is modelled" (behind_title(state)) }
             (table(&head, &rows, None))
         }
     }
 }
 
 /// How far every region goes into its curve; nothing where all is linear.
-pub(super) fn saturation(saturation: Option<&SaturationResult>, state: &str) -> Markup {
+pub(super) fn saturation(state: &State<'_>) -> Markup {
     let row = |region: &SaturatedRegion| {
         let tesla = |b: Option<f64>| b.map_or("–".to_owned(), |b| number(b, 4));
         vec![
@@ -87,8 +88,8 @@ pub(super) fn saturation(saturation: Option<&SaturationResult>, state: &str) -> 
         "volume beyond the knee",
     ];
     html! {
-        @if let Some(saturation) = saturation {
-            h3 { "Saturation" (state) }
+        @if let Some(saturation) = state.saturation {
+            h3 { "Saturation" (behind_title(state)) }
             (table(&head, &saturation.regions.iter().map(row).collect::<Vec<_>>(), None))
             (note(&format!(
                 "Newton's method took {} steps. Beyond the knee the differential permeability is below a tenth of its largest.",

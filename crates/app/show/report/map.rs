@@ -61,8 +61,10 @@ impl SurfaceValues {
     /// Thickness of the bodies; `None` where they have none, or what lies opposite may have moved and no field file says where to.
     pub(super) fn thickness(data: &RunData, outline: &Outline, design: &OutlinedDesign) -> Option<Self> {
         let thickness = design.thickness.as_ref()?;
-        let may_move =
-            data.config.remesh.as_ref().is_some_and(|r| !(r.free.is_empty() && r.slide.is_empty()));
+        let free = data.config.remesh.iter().flat_map(|remesh| &remesh.free);
+        let free = free.filter_map(|name| outline.full_mesh.topology().surface(name).ok());
+        let free: BTreeSet<NodeId> = free.flatten().flatten().copied().collect();
+        let may_move = thickness.opposite_nodes().any(|node| free.contains(&node));
         let values = [Moment::Before, Moment::After].map(|moment| {
             let place = place(data, outline, design, moment)
                 .filter(|_| !may_move || data.fields[moment as usize].is_ok())?;

@@ -152,9 +152,6 @@ fn colourings(
             values: surface.values.each_ref().map(at),
         }
     });
-    // What the map shows comes first.
-    let (first, last) = thickness.into_iter().partition::<Vec<_>, _>(|_| !is_along_normals(data));
-    all.extend(first);
     let undeformed = nodes.iter().map(|n| outline.full_mesh.point(*n));
     let undeformed: Vec<Point> = undeformed.collect();
     let motion = |points: &Vec<Point>| -> Vec<Option<f64>> {
@@ -171,7 +168,9 @@ fn colourings(
             values,
         });
     }
-    all.extend(last);
+    // What the map shows comes first.
+    let place = if is_along_normals(data) { all.len() } else { 0 };
+    all.splice(place..place, thickness);
     if let Ok(after) = &data.fields[1] {
         let before = data.fields[0].as_ref().ok();
         let of = |field: &Snapshot| flux_density(outline, design, nodes, field);

@@ -1,7 +1,5 @@
 //! Tables of the page: evaluations, constraints, terms, losses, probes, skin depths.
 
-use std::collections::BTreeMap;
-
 use maud::{Markup, html};
 
 use super::circuits::circuits;
@@ -11,8 +9,9 @@ use super::ticks::{number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline, PermeabilityOf, skin_warnings};
 use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel, Term};
-use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateErrors, StateResult, TermResult};
+use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateResult, TermResult};
 use crate::show::Evaluation;
+use crate::show::states::State;
 
 /// Head of a column of error bars, in the unit of the column before.
 pub(super) const ERROR_BAR: &str = "error bar (estimated)";
@@ -108,43 +107,11 @@ pub(super) fn evaluations(data: &RunData) -> Markup {
     }
 }
 
-/// What depends on the state, and the words that tell the state from others: its load, else its frequency.
-struct State<'a> {
-    words: String,
-    frequency: f64,
-    load: Option<&'a str>,
-    losses: &'a BTreeMap<String, f64>,
-    probes: &'a [ProbeResult],
-    errors: Option<&'a StateErrors>,
-}
-
-impl<'a> State<'a> {
-    /// The states of a result, at least one.
-    fn all(result: &'a RunResult) -> Vec<Self> {
-        if result.states.is_empty() {
-            let frequency = result.frequencies_hz.first().copied().unwrap_or_default();
-            let load = result.loads.first().map(String::as_str);
-            let (losses, probes) = (&result.losses_w, result.probes.as_slice());
-            let (words, errors) = (words_of(load, frequency), result.errors.as_ref());
-            return vec![Self { words, frequency, load, losses, probes, errors }];
-        }
-        let of = |state: &'a StateResult| Self {
-            words: words_of(state.load.as_deref(), state.frequency_hz),
-            frequency: state.frequency_hz,
-            load: state.load.as_deref(),
-            losses: &state.losses_w,
-            probes: &state.probes,
-            errors: state.errors.as_ref(),
-        };
-        result.states.iter().map(of).collect()
-    }
-
-    /// The same state of the initial design; `None` for an analysis.
-    fn initial<'r>(&self, result: &'r RunResult) -> Option<&'r StateResult> {
-        let is_same =
-            |other: &&StateResult| other.frequency_hz == self.frequency && other.load.as_deref() == self.load;
-        result.initial.iter().find(is_same)
-    }
+/// The same state of the initial design; `None` for an analysis.
+fn initial<'r>(state: &State<'_>, result: &'r RunResult) -> Option<&'r StateResult> {
+    let is_same =
+        |other: &&StateResult| other.frequency_hz == state.frequency && other.load.as_deref() == state.load;
+    result.initial.iter().find(is_same)
 }
 
 /// A load, or a frequency.
@@ -153,16 +120,17 @@ pub(super) fn words_of(load: Option<&str>, frequency: f64) -> String {
 }
 
 /// What stands behind the title of what is of one of several states: its load, else its frequency.
-pub(super) fn of_state(state: &StateResult) -> String {
-    match &state.load {
+pub(super) fn behind_title(state: &State<'_>) -> String {
+    match state.load {
+        _ if !state.is_one_of_several => String::new(),
         Some(load) => format!(", under the load {load}"),
-        None => format!(", at {}", hertz(state.frequency_hz)),
+        None => format!(", at {}", hertz(state.frequency)),
     }
 }
 
-/// The same of what is of the first state; nothing where there is only one.
+/// The same of what is of the first state.
 pub(super) fn of_first_state(result: &RunResult) -> String {
-    result.states.first().map(of_state).unwrap_or_default()
+    State::all(result).first().map(behind_title).unwrap_or_default()
 }
 
 /// What the column of a state is headed with.
@@ -176,17 +144,10 @@ pub(super) fn outcome(data: &RunData, result: &RunResult) -> Markup {
     html! {
         (constraints(result, &data.config.constraints))
         @if let Some(objective) = &result.objective { (terms(&objective.terms, data.config.objective.as_ref())) }
-        (circuits(result))
+        (circuits(result, &states))
         (harmonics::figures(&data.config, result))
         (losses(result, &states))
-        @for state in &result.states {
-            (iron::forces(&state.forces, state.errors.as_ref(), &of_state(state)))
-            (iron::saturation(state.saturation.as_ref(), &of_state(state)))
-        }
-        @if result.states.is_empty() {
-            (iron::forces(&result.forces, result.errors.as_ref(), ""))
-            (iron::saturation(result.saturation.as_ref(), ""))
-        }
+        @for state in &states { (iron::forces(state)) (iron::saturation(state)) }
         (probes(result, &states))
     }
 }
@@ -267,10 +228,10 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
 
 fn losses(result: &RunResult, states: &[State<'_>]) -> Markup {
     let row = |state: &State<'_>, (region, loss): (&String, &f64)| {
-        let before = state.initial(result).and_then(|initial| initial.losses_w.get(region));
+        let before = initial(state, result).and_then(|initial| initial.losses_w.get(region));
         let before = before.map_or(String::new(), |before| number(*before, 5));
         let error = state.errors.and_then(|errors| errors.losses_w.get(region));
-        vec![region.clone(), state.words.clone(), before, number(*loss, 5), bar(error, 1.0)]
+        vec![region.clone(), words_of(state.load, state.frequency), before, number(*loss, 5), bar(error, 1.0)]
     };
     let rows: Vec<Vec<String>> =
         states.iter().flat_map(|state| state.losses.iter().map(|entry| row(state, entry))).collect();
@@ -280,7 +241,7 @@ fn losses(result: &RunResult, states: &[State<'_>]) -> Markup {
 
 fn probes(result: &RunResult, states: &[State<'_>]) -> Markup {
     let of = |state: &State<'_>| {
-        let initial = state.initial(result);
+        let initial = initial(state, result);
         let before = |probe: &ProbeResult| initial?.probes.iter().find(|initial| initial.name == probe.name);
         state.probes.iter().flat_map(|probe| rows_of(state, probe, before(probe))).collect::<Vec<_>>()
     };
@@ -325,7 +286,7 @@ fn rows_of(state: &State<'_>, probe: &ProbeResult, initial: Option<&ProbeResult>
     };
     let row = |k: usize| {
         let place = probe.points_m[k].map(|c| trim_zeros(1e3 * c, 2)).join(", ");
-        let mut cells = vec![probe.name.clone(), place, state.words.clone()];
+        let mut cells = vec![probe.name.clone(), place, words_of(state.load, state.frequency)];
         let millitesla = |size: Option<f64>| size.map_or(String::new(), |size| number(1e3 * size, 4));
         cells.push(millitesla(initial.and_then(|initial| magnitude(initial, k))));
         if let (Some(re), Some(im)) = (probe.b_re_t[k], probe.b_im_t[k]) {
