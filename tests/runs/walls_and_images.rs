@@ -1,5 +1,12 @@
 //! What lies behind the outer faces of a mesh: walls that cut a field off, and images of what symmetry planes cut.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+use std::sync::Arc;
+
+use fluxmorph_geometry::generate::Grid;
+use fluxmorph_geometry::io::{MshEncoding, msh_bytes};
+use fluxmorph_geometry::tet4::{Point, norm};
+use fluxmorph_geometry::{Mesh, RegionId};
 use serde_json::Value;
 
 use super::plausible::{set, texts};
@@ -63,6 +70,89 @@ fn walls_are_known_by_where_they_are() {
     assert!(observed.0 == "z_min" && (0.015..0.025).contains(&observed.1), "{observed:?}");
     // In a plane at which something is observed the device goes on behind it.
     assert_ne!(with_probe("-400 mm").0, "z_min");
+}
+
+/// A ring coil of 40 mm in air.
+const RING: &str = r#"
+[mesh]
+file = "ring.msh"
+unit = "mm"
+
+[analysis]
+elements = "edge"
+frequency = 0
+
+[[coils]]
+name = "ring"
+shape = "circular"
+ampere_turns = "100 A"
+center = ["0 mm", "0 mm", "0 mm"]
+axis = [0, 0, 1]
+radius = "30 mm"
+width = "10 mm"
+height = "10 mm"
+
+[boundaries]
+flux_parallel = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
+
+[objective]
+kind = "energy"
+region = "air"
+"#;
+
+/// Whether walls lie along the axes, across them or bent, and whether planes of symmetry do: they are as near as they are, and as
+/// near to a whole device. From a ring that ends at 40 mm and 5 mm of height a cube of 48 mm is 8 mm away, and a ball of 50 mm
+/// `50 - (40² + 5²)^(1/2)`.
+#[test]
+fn curved_and_oblique_walls_are_as_near_as_others() {
+    let home = folder();
+    let half = 0.048;
+    let lines = |from: f64, cells: u32| -> Vec<f64> {
+        (0..=cells).map(|k| from + (half - from) * f64::from(k) / f64::from(cells)).collect()
+    };
+    let wall = |[x, y]: [f64; 2], place: &dyn Fn(Point) -> Point| {
+        let of = |from: f64| lines(from, if from == 0.0 { 6 } else { 12 });
+        let grid = Grid::new("grid", [of(x), of(y), of(-half)]).expect("a grid");
+        let topology = grid.topology(&["air"], |_| RegionId(0)).expect("a region");
+        let mesh = Mesh::new(Arc::new(topology), grid.points().into_iter().map(place).collect());
+        let bytes = msh_bytes(&mesh.expect("a mesh"), 1e-3, MshEncoding::Ascii).expect("finite");
+        std::fs::write(home.path().join("ring.msh"), bytes).expect("written");
+        let config = home.path().join("ring.toml");
+        std::fs::write(&config, RING).expect("written");
+        let json = finish(&mut command(&[&"check", &config, &"--json"])).exits_with(0).json();
+        ["distance_m", "source_size_m"].map(|key| number(&json["truncation"], &format!("/{key}")))
+    };
+    let turned = |[x, y, z]: Point| {
+        let share = FRAC_1_SQRT_2;
+        [share * (x - y), share * (x + y), z]
+    };
+    // Cubes and squares onto balls and discs: a point keeps its direction.
+    let stretched = |largest: f64, length: f64| if length > 0.0 { largest / length } else { 1.0 };
+    let round = |[x, y, z]: Point| {
+        let by = stretched(x.abs().max(y.abs()), x.hypot(y));
+        [by * x, by * y, z]
+    };
+    let ball = |x: Point| {
+        let by = stretched(x.iter().fold(0.0, |most, c| c.abs().max(most)), norm(x)) * 50.0 / 48.0;
+        x.map(|c| by * c)
+    };
+    let whole = [-half; 2];
+    let [distance, size] = wall(whole, &|x| x);
+    assert!((distance - 0.008).abs() < 1e-6 && (size / norm([0.04, 0.04, 0.005]) - 1.0).abs() < 1e-6);
+    let shapes: [(&str, [f64; 2], &dyn Fn(Point) -> Point, f64); 5] = [
+        ("turned", whole, &turned, 0.008),
+        ("a quarter", [0.0; 2], &|x| x, 0.008),
+        ("a quarter, turned", [0.0; 2], &turned, 0.008),
+        ("a cylinder", whole, &round, 0.008),
+        ("a ball", whole, &ball, 0.05 - 0.04f64.hypot(0.005)),
+    ];
+    for (name, corner, place, expected) in shapes {
+        let [distance, own] = wall(corner, place);
+        println!("{name}: {distance:.3e} m, {own:.3e} m");
+        // Facets cut off up to 0.4 mm of a circle, and the winding's edges 0.05 mm.
+        assert!((expected - 5e-4..expected + 1e-4).contains(&distance), "{name}: {distance}");
+        assert!((own / size - 1.0).abs() < 0.02, "{name}: {own} of {size}");
+    }
 }
 
 /// The field is left normal to it, as to a flux-normal one.

@@ -4,6 +4,8 @@
 //! Walls are the sides of the mesh, whatever their names and conditions, but planes of symmetry: those that coils, matter or what is
 //! observed reach; and those that flux passes at a right angle, unless such a plane, or one that is reached, lies opposite.
 
+mod place;
+
 use std::collections::HashSet;
 
 use fluxmorph_geometry::box_tree::AxisBox;
@@ -15,6 +17,7 @@ use fluxmorph_solver::coil::CoilShape;
 use fluxmorph_solver::{Boundary, FieldModel, Material};
 use serde::Serialize;
 
+use self::place::Place;
 use super::soundness::faces_of;
 use super::{Setup, functionals};
 use crate::config::{Config, ObjectiveKind};
@@ -46,7 +49,7 @@ pub(crate) struct Truncation {
     /// Where a side without a name is [m].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) at_m: Option<Point>,
-    /// To it from the box around coils and matter, or from a place that is observed [m].
+    /// To it from coils and matter, or from a place that is observed [m].
     pub(crate) distance_m: f64,
     /// Half the diagonal of the box around all of these, with what planes of symmetry cut off [m].
     pub(crate) source_size_m: f64,
@@ -64,48 +67,71 @@ enum Standing {
     Free,
     /// A plane of `flux_normal`.
     Normal,
-    /// A side that coils or matter reach, or a plane that what is observed does: one of symmetry.
+    /// A plane that what is observed reaches: one of symmetry.
+    Observed,
+    /// A plane of symmetry that coils or matter reach, or a curved side all along which there is matter.
     Reached,
 }
 
 /// A side of the mesh.
 struct Side {
     patch: OpenPatch,
-    /// Its nodes, each at least once, and the box around them.
-    nodes: Vec<NodeId>,
+    triangles: Vec<[NodeId; 3]>,
+    /// The box around it.
     bounds: AxisBox,
+    /// Of a plane, out of the mesh.
+    normal: Option<Point>,
     standing: Standing,
 }
 
 impl Side {
+    /// A side of which nothing is known yet.
+    fn new(hull: &Hull<'_>, patch: OpenPatch) -> Self {
+        let triangles: Vec<[NodeId; 3]> = patch.faces.iter().map(|&face| hull.faces()[face].nodes).collect();
+        let corners: Vec<Point> = triangles.as_flattened().iter().map(|&n| hull.mesh().point(n)).collect();
+        let length = norm(patch.area_vector);
+        let normal = (length >= PLANE * patch.area).then(|| patch.area_vector.map(|c| c / length));
+        Self { bounds: AxisBox::around(&corners), triangles, normal, standing: Standing::Wall, patch }
+    }
+
+    /// Whether it is a plane that faces another one.
+    fn is_opposite(&self, other: &Self) -> bool {
+        dot(self.patch.area_vector, other.patch.area_vector) < OPPOSITE * self.patch.area * other.patch.area
+    }
+
     /// Whether it is a wall beside these, one of which may be itself.
     fn is_wall(&self, all: &[Self]) -> bool {
-        let Self { patch, standing, .. } = self;
-        let is_opposite = |other: &&Self| {
-            dot(patch.area_vector, other.patch.area_vector) < OPPOSITE * patch.area * other.patch.area
-        };
-        match standing {
+        let beats = |other: &Self| self.is_opposite(other) && other.standing >= self.standing;
+        match self.standing {
             Standing::Wall => true,
-            Standing::Free | Standing::Normal => {
-                all.iter().filter(is_opposite).any(|other| other.standing >= *standing)
-            }
-            Standing::Reached => false,
+            Standing::Free | Standing::Normal => all.iter().any(beats),
+            Standing::Observed | Standing::Reached => false,
         }
     }
 
-    /// Square of its distance from the nearest of some places [m²].
-    fn square_distance<'a>(&self, mesh: &Mesh, places: impl Iterator<Item = &'a AxisBox>) -> f64 {
-        let mut by_bound: Vec<_> = places.map(|place| (place.square_gap(&self.bounds), place)).collect();
-        by_bound.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut nearest = f64::INFINITY;
-        for (bound, place) in by_bound {
-            if bound >= nearest {
-                break;
-            }
-            let to_nodes = self.nodes.iter().map(|&n| place.square_distance(mesh.point(n)));
-            nearest = to_nodes.fold(nearest, f64::min);
-        }
-        nearest
+    /// Whether a place reaches it, to the rounding of coordinates [m].
+    fn is_reached(&self, mesh: &Mesh, place: &Place, rounding: f64) -> bool {
+        place.distance(mesh, self, 2.0 * rounding) <= rounding
+    }
+
+    /// A point on the other side of its plane is moved onto it, and all others kept [m].
+    fn in_front(&self, x: Point) -> Point {
+        let beyond = self.beyond(x).max(0.0);
+        self.along_normal(x, -beyond)
+    }
+
+    /// The image of a point in its plane [m].
+    fn image(&self, x: Point) -> Point {
+        self.along_normal(x, -2.0 * self.beyond(x))
+    }
+
+    /// How far a point lies behind its plane [m].
+    fn beyond(&self, x: Point) -> f64 {
+        self.normal.map_or(0.0, |normal| dot(normal, sub(x, self.patch.place)))
+    }
+
+    fn along_normal(&self, x: Point, step: f64) -> Point {
+        self.normal.map_or(x, |normal| std::array::from_fn(|d| x[d] + step * normal[d]))
     }
 }
 
@@ -116,24 +142,27 @@ impl Truncation {
         if model.setup().open.is_some() {
             return None;
         }
-        let mut points: Vec<_> = sources(model).into_iter().flat_map(|e| mesh.vertices(e)).collect();
-        points.extend(analytic_coils(model, mesh));
-        // A conductor that its surface replaces is matter too.
-        let replaced = model.conductors().iter().flat_map(|conductor| conductor.surface.iter().flatten());
-        points.extend(replaced.map(|&n| mesh.point(n)));
-        if points.is_empty() {
+        let sources = sources(model, mesh);
+        if sources.iter().all(Place::is_empty) {
             return None;
         }
         let [lower, upper] = mesh.bounding_box();
         let whole = AxisBox { lower, upper };
-        let (sources, observed) = (AxisBox::around(&points), observed(config, mesh, &whole));
+        let observed = observed(config, mesh, &whole);
         let hull = Hull::new(mesh);
-        let sides = sides(&hull, model, (&sources, &observed), rounding(&whole));
-        let places = || observed.iter().chain([&sources]);
-        let distance = |side: &Side| side.square_distance(mesh, places()).sqrt();
-        let walls = sides.iter().filter(|side| side.is_wall(&sides)).map(|side| (side, distance(side)));
-        let (side, distance_m) = walls.min_by(|a, b| a.1.total_cmp(&b.1))?;
-        let (source_size_m, near) = size(&whole, &sources, &observed);
+        let sides = sides(&hull, model, (&sources, &observed), ROUNDING * norm(sub(upper, lower)));
+        let places: Vec<&Place> = sources.iter().chain(&observed).collect();
+        let mut nearest: Option<(&Side, f64)> = None;
+        for side in sides.iter().filter(|side| side.is_wall(&sides)) {
+            let far = nearest.map_or(f64::INFINITY, |(_, distance)| distance);
+            let distance = places.iter().fold(far, |far, place| place.distance(mesh, side, far));
+            if distance < far {
+                nearest = Some((side, distance));
+            }
+        }
+        let (side, distance_m) = nearest?;
+        let source_size_m = size(&whole, &places, &sides);
+        let near = if is_plane_device(&sides) { NEAR_IN_A_PLANE } else { NEAR };
         let (surface, at_m) = name(&hull, side);
         Some(Self { surface, at_m, distance_m, source_size_m, near })
     }
@@ -150,7 +179,7 @@ impl Truncation {
         let ratio = distance_m / source_size_m;
         (ratio < *near).then(|| {
             format!(
-                "the wall {} is {:.3} mm from the box around coils, matter and what is observed, {ratio:.1} times their half \
+                "the wall {} is {:.3} mm from coils, matter and what is observed, {ratio:.1} times their half \
                  diagonal: where it stands for open space, no error bar counts what it cuts off; walls farther off show how much that is",
                 self.named("`"),
                 Millimetres(*distance_m)
@@ -159,11 +188,11 @@ impl Truncation {
     }
 }
 
-/// The sides of a mesh, and which of them coils and matter reach, or what is observed, to the rounding of coordinates [m].
+/// The sides of a mesh, and what they stand for; coordinates are off by `rounding` [m].
 fn sides(
     hull: &Hull<'_>,
     model: &FieldModel,
-    (sources, observed): (&AxisBox, &[AxisBox]),
+    (sources, observed): (&[Place], &[Place]),
     rounding: f64,
 ) -> Vec<Side> {
     let (mesh, faces) = (hull.mesh(), hull.faces());
@@ -174,26 +203,28 @@ fn sides(
     };
     let normal = with(&|own| own == Boundary::FluxNormal);
     let others = with(&|own| own != Boundary::FluxNormal);
+    let matter: HashSet<ElementId> = wound_or_matter(model).collect();
     let of = |patch: OpenPatch| {
-        let nodes: Vec<NodeId> = patch.faces.iter().flat_map(|&face| faces[face].nodes).collect();
-        let bounds = AxisBox::around(&nodes.iter().map(|&n| mesh.point(n)).collect::<Vec<_>>());
-        let is_reached = |from: &AxisBox| {
-            let of_face = |&face: &usize| AxisBox::around(&hull.corners(face)).grown(rounding).meets(from);
-            bounds.grown(rounding).meets(from) && patch.faces.iter().any(of_face)
-        };
-        let all = |of: &HashSet<_>| patch.faces.iter().all(|&face| of.contains(&face_key(faces[face].nodes)));
-        let any = |of: &HashSet<_>| patch.faces.iter().any(|&face| of.contains(&face_key(faces[face].nodes)));
-        let is_plane = norm(patch.area_vector) >= PLANE * patch.area;
-        let standing = if is_reached(sources) || is_plane && observed.iter().any(is_reached) {
+        let side = Side::new(hull, patch);
+        let all = |of: &HashSet<_>| side.triangles.iter().all(|&face| of.contains(&face_key(face)));
+        let any = |of: &HashSet<_>| side.triangles.iter().any(|&face| of.contains(&face_key(face)));
+        let is_reached_by =
+            |places: &[Place]| places.iter().any(|place| side.is_reached(mesh, place, rounding));
+        let is_covered = || side.patch.faces.iter().all(|&face| matter.contains(&faces[face].inside));
+        let standing = if side.normal.is_none() {
+            if is_covered() { Standing::Reached } else { Standing::Wall }
+        } else if is_reached_by(sources) {
             Standing::Reached
-        } else if !is_plane || any(&others) {
+        } else if is_reached_by(observed) {
+            Standing::Observed
+        } else if any(&others) {
             Standing::Wall
         } else if all(&normal) {
             Standing::Normal
         } else {
             Standing::Free
         };
-        Side { standing, nodes, bounds, patch }
+        Side { standing, ..side }
     };
     let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
     let replaced: HashSet<_> = replaced.map(|triangle| face_key(*triangle)).collect();
@@ -217,34 +248,42 @@ fn name(hull: &Hull<'_>, side: &Side) -> (String, Option<Point>) {
     }
 }
 
-/// How far off coordinates in a box around a mesh may be [m].
-fn rounding(whole: &AxisBox) -> f64 {
-    ROUNDING * norm(sub(whole.upper, whole.lower))
-}
-
-/// In which directions a box reaches the least and the greatest coordinates of that around the mesh.
-fn cuts(whole: &AxisBox, own: &AxisBox) -> [[bool; 2]; 3] {
-    let rounding = rounding(whole);
-    [0, 1, 2].map(|d| [own.lower[d] <= whole.lower[d] + rounding, own.upper[d] >= whole.upper[d] - rounding])
-}
-
-/// Half the diagonal of the box around all that makes, bends and observes the field, with what planes of symmetry cut off [m], and in
-/// how many of it a wall is near; `mesh` is the box around that.
-fn size(mesh: &AxisBox, sources: &AxisBox, observed: &[AxisBox]) -> (f64, f64) {
-    let all = observed.iter().fold(*sources, |all, own| all.with(own));
-    // What a plane of symmetry cuts goes on behind it.
-    let of_all = cuts(mesh, &all);
-    let extent = |d: usize| {
-        let own = all.upper[d] - all.lower[d];
-        if of_all[d][0] != of_all[d][1] { 2.0 * own } else { own }
+/// Half the diagonal of the box around all that makes, bends and observes the field, with what planes of symmetry cut off [m];
+/// `whole` is the box around the mesh.
+fn size(whole: &AxisBox, places: &[&Place], sides: &[Side]) -> f64 {
+    let planes = planes_of_symmetry(sides);
+    let within = |x: Point| -> Point { std::array::from_fn(|d| x[d].clamp(whole.lower[d], whole.upper[d])) };
+    let meshed = |x: Point| planes.iter().fold(within(x), |x, plane| plane.in_front(x));
+    // What a plane of symmetry cuts goes on behind it, and what two of them cut behind both.
+    let images = |x: Point| {
+        let behind = |k: usize| planes[..k].iter().chain(&planes[k + 1..]);
+        let of_plane = |k: usize| {
+            let image = planes[k].image(x);
+            behind(k).map(move |second| second.image(image)).chain([image])
+        };
+        AxisBox::around(&(0..planes.len()).flat_map(of_plane).chain([x]).collect::<Vec<_>>())
     };
-    let is_plane = cuts(mesh, sources).contains(&[true, true]);
-    (0.5 * norm([0, 1, 2].map(extent)), if is_plane { NEAR_IN_A_PLANE } else { NEAR })
+    let corners = places.iter().flat_map(|place| place.corners()).map(meshed);
+    let all = corners.fold(AxisBox::around(&[]), |all, x| all.with(&images(x)));
+    0.5 * norm(sub(all.upper, all.lower))
 }
 
-/// The places at which B is observed: the boxes around regions and expansions, as far as they lie in the mesh, and the points of
-/// probes. A region that fills the mesh, of which `whole` is the box, is no place.
-fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<AxisBox> {
+/// Planes that are reached, but for those that face each other.
+fn planes_of_symmetry(sides: &[Side]) -> Vec<&Side> {
+    let reached = || sides.iter().filter(|side| side.standing >= Standing::Observed);
+    let is_lone = |side: &&Side| !reached().any(|other| side.is_opposite(other));
+    reached().filter(|side| side.normal.is_some()).filter(is_lone).collect()
+}
+
+/// Whether coils and matter reach from one side of the mesh to the one that faces it.
+fn is_plane_device(sides: &[Side]) -> bool {
+    let reached = || sides.iter().filter(|side| side.standing == Standing::Reached);
+    reached().any(|side| reached().any(|other| side.is_opposite(other)))
+}
+
+/// The places at which B is observed: regions, expansions, and the points of probes. What fills the mesh, of which `whole` is the
+/// box, is no place.
+fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Place> {
     let topology = mesh.topology();
     let is_of_places = |kind: ObjectiveKind| {
         use ObjectiveKind::{FieldComponent, FluxDensitySquared, Homogeneity, TargetField};
@@ -252,42 +291,37 @@ fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<AxisBox> {
     };
     let own = functionals(config).into_iter().filter(|(_, own)| is_of_places(own.kind));
     let regions = own.filter_map(|(_, own)| topology.region(own.region.as_ref()?).ok());
-    let corners = |region| -> Vec<Point> {
-        topology.elements_of(region).into_iter().flat_map(|e| mesh.vertices(e)).collect()
+    let of_regions = regions.map(|region| Place::of_nodes(mesh, topology.elements_of(region), []));
+    let of_probes = config.probes.iter().map(|probe| Place::Points(probe.points.clone()));
+    let of_expansions =
+        config.multipoles.iter().map(|set| Place::Ball { center: set.center, radius: set.radius });
+    let fills_mesh = |place: &Place| {
+        let AxisBox { lower, upper } = place.bounds();
+        (0..3).all(|d| lower[d] <= whole.lower[d] && upper[d] >= whole.upper[d])
     };
-    let of_regions = regions.map(|region| AxisBox::around(&corners(region)));
-    let of_probes = config.probes.iter().flat_map(|probe| &probe.points).map(|&p| AxisBox::around(&[p]));
-    let AxisBox { lower, upper } = whole;
-    let of_expansions = config.multipoles.iter().map(|set| AxisBox {
-        lower: std::array::from_fn(|d| (set.center[d] - set.radius).clamp(lower[d], upper[d])),
-        upper: std::array::from_fn(|d| (set.center[d] + set.radius).clamp(lower[d], upper[d])),
+    of_regions.chain(of_probes).chain(of_expansions).filter(|place| !fills_mesh(place)).collect()
+}
+
+/// Where windings, conductors and matter are, and conductors that their surfaces replace.
+fn sources(model: &FieldModel, mesh: &Mesh) -> Vec<Place> {
+    let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
+    let meshed = Place::of_nodes(mesh, wound_or_matter(model), replaced.flatten().copied());
+    let analytic = model.coils().iter().filter_map(|coil| match &coil.shape {
+        CoilShape::Racetrack(coil) => Some(Place::of_winding(coil)),
+        CoilShape::Region(_) | CoilShape::Solid(_) => None,
     });
-    let is_place = |own: &AxisBox| cuts(whole, own) != [[true; 2]; 3];
-    of_regions.chain(of_probes).chain(of_expansions).filter(is_place).collect()
+    analytic.chain([meshed]).collect()
 }
 
 /// Elements of windings and conductors, or that are not air.
-fn sources(model: &FieldModel) -> Vec<ElementId> {
+fn wound_or_matter(model: &FieldModel) -> impl Iterator<Item = ElementId> {
     let is_matter = |&e: &ElementId| {
         let region = model.topology().region_of()[e.index()];
         model.materials()[region.index()] != Material::AIR || model.remanence_of(e) != [0.0; 3]
     };
     let wound = model.coils().iter().filter_map(|coil| coil.shape.region_current());
     let wound = wound.flat_map(|current| current.current_density().iter().map(|(e, _)| *e));
-    wound.chain(model.topology().elements().filter(is_matter)).collect()
-}
-
-/// The corners of the boxes around coils that the mesh need not follow, as far as these lie in the mesh: a plane of symmetry cuts
-/// them.
-fn analytic_coils(model: &FieldModel, mesh: &Mesh) -> Vec<Point> {
-    let [lower, upper] = mesh.bounding_box();
-    let within = |corner: Point| -> Point { std::array::from_fn(|d| corner[d].clamp(lower[d], upper[d])) };
-    let shapes = model.coils().iter().map(|coil| &coil.shape);
-    let boxes = shapes.filter_map(|shape| match shape {
-        CoilShape::Racetrack(coil) => Some(coil.bounding_box()),
-        CoilShape::Region(_) | CoilShape::Solid(_) => None,
-    });
-    boxes.flatten().map(within).collect()
+    wound.chain(model.topology().elements().filter(is_matter))
 }
 
 #[cfg(test)]
@@ -305,9 +339,7 @@ mod tests {
         };
         let text = at(0.29, NEAR).described().expect("it is near");
         assert!(
-            text.contains(
-                "`x_max` is 290.000 mm from the box around coils, matter and what is observed, 2.9 times"
-            ),
+            text.contains("`x_max` is 290.000 mm from coils, matter and what is observed, 2.9 times"),
             "{text}"
         );
         assert_eq!(at(0.31, NEAR).described(), None);

@@ -131,7 +131,7 @@ fn field(summary: &Summary<'_>, row: &mut impl FnMut(&str, String)) {
         row(
             "nearest wall",
             format!(
-                "{}: {distance} mm from the box around coils, matter and what is observed, {times:.1} times their half \
+                "{}: {distance} mm from coils, matter and what is observed, {times:.1} times their half \
                  diagonal {size} mm; [open] takes walls away",
                 wall.named("")
             ),

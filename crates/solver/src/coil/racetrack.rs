@@ -7,7 +7,9 @@
 //! A rectangular coil is one with mitred corners, a circular one has corners as round as its window. The integral of
 //! `T` over an element is in [`super::moment`].
 
-use fluxmorph_geometry::tet4::Point;
+use std::f64::consts::FRAC_PI_2;
+
+use fluxmorph_geometry::tet4::{Point, add};
 
 use super::frame::Frame;
 use crate::error::SolverError;
@@ -38,6 +40,12 @@ pub struct Racetrack {
 /// Share of the winding's width and height that counts as its skin: a face of the mesh that lies on the winding's
 /// surface does not cut it, whatever the rounding of its nodes.
 const SKIN: f64 = 1e-6;
+
+/// In so many pieces goes a straight side of [`Racetrack::edges`].
+const STRAIGHT: usize = 8;
+
+/// The same of a quarter of a circle.
+const ARC: usize = 16;
 
 impl Racetrack {
     /// A coil about the coordinate axis `axis` (0, 1, 2) through `centre` [m].
@@ -184,6 +192,53 @@ impl Racetrack {
         [-1.0, 1.0].map(|side| std::array::from_fn(|d| centre[d] + side * half(d)))
     }
 
+    /// Edges of a winding of flat facets inscribed in this one [m]: its contours at both ends, and what joins these along the axis.
+    /// A straight side has [`STRAIGHT`] of them and a quarter of a round corner [`ARC`], so that they leave out .12 % of its radius.
+    pub fn edges(&self) -> Vec<[Point; 2]> {
+        let place = |local: Point| add(self.frame.centre(), self.frame.vector(local));
+        let mut edges = Vec::new();
+        for contour in [0.0, self.width].map(|outwards| self.contour(outwards)) {
+            for (k, &[x, y]) in contour.iter().enumerate() {
+                let [p, q] = contour[(k + 1) % contour.len()];
+                let [lower, upper] = [-0.5, 0.5].map(|side| side * self.height);
+                edges.extend([lower, upper].map(|z| [place([x, y, z]), place([p, q, z])]));
+                edges.push([place([x, y, lower]), place([x, y, upper])]);
+            }
+        }
+        edges
+    }
+
+    /// Points around the window at a distance outwards from it, anticlockwise, along the frame's two directions [m].
+    fn contour(&self, outwards: f64) -> Vec<[f64; 2]> {
+        let (radius, arc) = match self.corner {
+            Corner::Mitred => (0.0, 0),
+            Corner::Round { inner_radius } => (inner_radius + outwards, ARC),
+        };
+        let centre = self.half_window.map(|half| half + outwards - radius);
+        let signs = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+        let quarter = |k: usize| -> Vec<[f64; 2]> {
+            let on_arc = |i: usize| {
+                let angle = FRAC_PI_2 * (k as f64 + i as f64 / arc.max(1) as f64);
+                [
+                    signs[k][0] * centre[0] + radius * angle.cos(),
+                    signs[k][1] * centre[1] + radius * angle.sin(),
+                ]
+            };
+            (0..=arc).map(on_arc).collect()
+        };
+        let corners = [0, 1, 2, 3].map(quarter);
+        let mut points = Vec::new();
+        for k in 0..4 {
+            let (from, to) = (corners[k][arc], corners[(k + 1) % 4][0]);
+            points.extend_from_slice(&corners[k][..arc]);
+            points.extend((0..STRAIGHT).map(|i| {
+                let share = i as f64 / STRAIGHT as f64;
+                [0, 1].map(|d| from[d] + share * (to[d] - from[d]))
+            }));
+        }
+        points
+    }
+
     /// The smaller of width and height [m]: the size of the winding's detail.
     pub(super) fn detail(&self) -> f64 {
         self.width.min(self.height)
@@ -289,6 +344,42 @@ mod tests {
             // One cell more or less at each end of the winding: 2 % of it.
             assert!((current - 1.0).abs() < 0.03, "{current}");
             assert!((coil.potential(coil.frame.centre()) * 0.04 - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn edges_follow_the_contours_of_the_winding() {
+        let round = Corner::Round { inner_radius: 0.02 };
+        for coil in [
+            Racetrack::in_frame(tilted(), [0.06, 0.16], 0.02, 0.04, Corner::Mitred).unwrap(),
+            Racetrack::in_frame(tilted(), [0.06, 0.16], 0.02, 0.04, round).unwrap(),
+            Racetrack::circular(tilted(), 0.05, 0.02, 0.04).unwrap(),
+        ] {
+            let edges = coil.edges();
+            for x in edges.as_flattened() {
+                let local = coil.frame.local(*x);
+                let outwards = coil.distance(local);
+                assert!(outwards.abs() < 1e-12 || (outwards - 0.02).abs() < 1e-12, "{outwards}");
+                assert!((local[2].abs() - 0.02).abs() < 1e-12);
+            }
+            // Area of the outer contour at the upper end, by the edges that go along it.
+            let along = |edge: &&[Point; 2]| {
+                let ends = edge.map(|x| coil.frame.local(x));
+                ends.iter().all(|x| coil.distance(*x) > 0.01 && x[2] > 0.0)
+            };
+            let area = |[a, b]: &[Point; 2]| {
+                let (a, b) = (coil.frame.local(*a), coil.frame.local(*b));
+                0.5 * (a[0] * b[1] - a[1] * b[0])
+            };
+            let [a, b] = coil.half_window.map(|half| 2.0 * (half + coil.width));
+            let missing = match coil.corner {
+                Corner::Mitred => 0.0,
+                Corner::Round { inner_radius } => {
+                    (4.0 - std::f64::consts::PI) * (inner_radius + coil.width).powi(2)
+                }
+            };
+            let sum: f64 = edges.iter().filter(along).map(area).sum();
+            assert!((sum / (a * b - missing) - 1.0).abs() < 2e-3, "{sum}");
         }
     }
 
