@@ -139,20 +139,18 @@ fn curved_and_oblique_walls_are_as_near_as_others() {
     let whole = [-half; 2];
     let [distance, size] = wall(whole, &|x| x);
     assert!((distance - 0.008).abs() < 1e-6 && (size / norm([0.04, 0.04, 0.005]) - 1.0).abs() < 1e-6);
-    let shapes: [(&str, [f64; 2], &dyn Fn(Point) -> Point, f64); 5] = [
-        ("turned", whole, &turned, 0.008),
-        ("a quarter", [0.0; 2], &|x| x, 0.008),
-        ("a quarter, turned", [0.0; 2], &turned, 0.008),
-        ("a cylinder", whole, &round, 0.008),
-        ("a ball", whole, &ball, 0.05 - 0.04f64.hypot(0.005)),
-    ];
-    for (name, corner, place, expected) in shapes {
+    let same = |name: &str, corner: [f64; 2], place: &dyn Fn(Point) -> Point, expected: f64| {
         let [distance, own] = wall(corner, place);
         println!("{name}: {distance:.3e} m, {own:.3e} m");
         // Facets cut off up to 0.4 mm of a circle, and the winding's edges 0.05 mm.
         assert!((expected - 5e-4..expected + 1e-4).contains(&distance), "{name}: {distance}");
         assert!((own / size - 1.0).abs() < 0.02, "{name}: {own} of {size}");
-    }
+    };
+    same("turned", whole, &turned, 0.008);
+    same("a quarter", [0.0; 2], &|x| x, 0.008);
+    same("a quarter, turned", [0.0; 2], &turned, 0.008);
+    same("a cylinder", whole, &round, 0.008);
+    same("a ball", whole, &ball, 0.05 - 0.04f64.hypot(0.005));
 }
 
 /// The field is left normal to it, as to a flux-normal one.
