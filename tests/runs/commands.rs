@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
+use super::plausible::{set, texts};
 use crate::support::folder::{RunFolder, count, files_below, list, named, number, numbers, vectors};
-use crate::support::program::{fluxmorph, folder};
+use crate::support::program::{command, finish, fluxmorph, folder};
 use crate::support::repository;
 use crate::support::shield::{Model, height, on_quick, plate_bottom, quick};
 
@@ -186,6 +187,40 @@ fn a_probe_that_the_moving_plate_swallows_is_left_out_of_the_result() {
         assert_eq!(result["probes"][0][part][0], serde_json::Value::Null);
         assert_eq!(numbers(&result, &format!("/probes/0/{part}/1")).len(), 3);
     }
+}
+
+/// Where B jumps, a point on the face has the field of one side.
+#[test]
+fn a_probe_on_a_face_of_iron_is_asked_about() {
+    let said = |depth: &str, permeability: &str| {
+        let point = format!("probes[0].points=[[\"10 mm\", \"10 mm\", \"{depth}\"]]");
+        let material = format!("materials.steel.relative_permeability={permeability}");
+        let further = ["--json", "--set", &point, "--set", &material, "--set", "regions.plate.model=volume"];
+        let checked = finish(command(&[&"check", &quick()]).args(further)).exits_with(0).json();
+        checked["warnings"]
+            .to_string()
+            .contains("between `remesh` and `plate`, where B jumps: it is that in `remesh`")
+    };
+    assert!(said("-10 mm", "100") && !said("-10 mm", "1") && !said("-11 mm", "100") && !said("-9 mm", "100"));
+}
+
+#[test]
+fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
+    let home = folder();
+    let out = home.path().join("out");
+    let asks = |objective: &str| {
+        let coarse = ["mesh.boxes.refinement=0.5", "output.verify_refinement=0", objective];
+        let further = ["--out", out.to_str().expect("UTF-8"), "--force", "--max-evaluations", "1"];
+        let config = repository("configs/actuator.toml");
+        finish(command(&[&"run", &config]).args(further).args(set(&coarse))).exits_with(1);
+        texts(&RunFolder(out.clone()).result()["warnings"]).contains("reverse its direction or minimise it")
+    };
+    assert!(asks("objective.direction=[0, 0, 1]") && !asks("objective.direction=[0, 0, -1]"));
+    // What counts against the others has no direction to reverse.
+    let own = "kind = \"force\", region = \"armature\"";
+    let terms =
+        format!("[{{{own}, direction = [0, 0, -1]}}, {{{own}, direction = [0, 0, -1], weight = -2}}]");
+    assert!(!asks(&format!("objective={{goal = \"maximise\", terms = {terms}}}")));
 }
 
 #[test]

@@ -3,10 +3,11 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::generate::{ShieldParameters, shield};
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh_file};
+use fluxmorph_geometry::{Mesh, NodeId};
 
 use crate::support::folder::{RunFolder, count, list, named, number, read_text, vectors};
 use crate::support::program::{Finished, command, finish, folder};
@@ -80,6 +81,33 @@ fn a_file_solves_as_the_generator_that_made_it() {
     let objective = |name: &str| number(&RunFolder(home.path().join(name)).result(), "/objective/best");
     // Coordinates of the file are within a rounding of the generator's; the solver stops at 1e-11.
     assert!((objective("file") / objective("generated") - 1.0).abs() < 1e-9);
+}
+
+/// Their normals point out of the body, however a mesher has ordered them.
+#[test]
+fn surfaces_of_bodies_are_written_out_of_them() {
+    let home = folder();
+    let config = device(home.path());
+    edit(&config, "model = \"impedance\"", "model = \"volume\"");
+    let written = |mesh: &Mesh| {
+        let bytes = msh_bytes(mesh, 1e-3, MshEncoding::Ascii).expect("finite");
+        fs::write(home.path().join("device.msh"), bytes).expect("written");
+        let out = home.path().join("out");
+        let further = ["--force", "--set", "analysis.frequency=0", "--set", "output.stl=[\"plate_bottom\"]"];
+        finish(command(&[&"solve", &config, &"--out", &out]).args(further)).exits_with(0);
+        fs::read(out.join("optimum_plate_bottom.stl")).expect("written")
+    };
+    let mesh = generated();
+    let turn = |(k, &[a, b, c]): (usize, &[NodeId; 3])| if k % 3 == 0 { [a, c, b] } else { [a, b, c] };
+    let bottom =
+        mesh.topology().surface("plate_bottom").expect("named").iter().enumerate().map(turn).collect();
+    let topology = mesh.topology().as_ref().clone().with_surface("plate_bottom", bottom).expect("its faces");
+    let turned = Mesh::new(Arc::new(topology), mesh.points().to_vec()).expect("the same elements");
+    let stl = written(&turned);
+    assert_eq!(stl, written(&mesh));
+    // Of each triangle the normal comes first, behind a head of 84 bytes.
+    let component = |triangle: &[u8], d: usize| f32::from_le_bytes([0, 1, 2, 3].map(|i| triangle[4 * d + i]));
+    assert!(stl[84..].chunks(50).all(|triangle| component(triangle, 2) < -0.99));
 }
 
 #[test]

@@ -478,21 +478,6 @@ fn a_tolerance_that_no_mesh_is_refined_for_is_said_by_check() {
 }
 
 #[test]
-fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
-    let home = folder();
-    let out = home.path().join("out");
-    let asks = |direction: &str| {
-        let direction = format!("objective.direction={direction}");
-        let coarse = ["mesh.boxes.refinement=0.5", "output.verify_refinement=0", &direction];
-        let further = ["--out", out.to_str().expect("UTF-8"), "--force", "--max-evaluations", "1"];
-        let config = repository("configs/actuator.toml");
-        finish(command(&[&"run", &config]).args(further).args(set(&coarse))).exits_with(1);
-        texts(&RunFolder(out.clone()).result()["warnings"]).contains("reverse its direction or minimise it")
-    };
-    assert!(asks("[0, 0, 1]") && !asks("[0, 0, -1]"));
-}
-
-#[test]
 fn degrees_without_their_unit_are_asked_about() {
     let said = "coils[0].phase is 14.3 turns: if degrees are meant";
     assert!(check(&["coils[0].phase=90"]).contains(said));

@@ -185,6 +185,7 @@ fn problem_on(
         sink.take(source.check(faults).map_err(Error::from))?;
         warnings.extend(plausible::warnings(config, &full_mesh, coils, &open_patches));
         warnings.extend(applied::on_conductors(config, &full_mesh));
+        warnings.extend(probes::warnings(config, &mesh));
         warnings.extend(elements::warnings(config, &full_mesh, &audits));
     }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());

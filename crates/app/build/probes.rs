@@ -1,8 +1,11 @@
-//! Whether the field can be measured at every point of the probes, before a run is spent on it.
+//! Whether the field can be measured at every point of the probes, before a run is spent on it, and on which side of a face.
 
-use fluxmorph_geometry::locate::locate;
-use fluxmorph_geometry::{Mesh, millimetres};
+use std::collections::BTreeMap;
 
+use fluxmorph_geometry::locate::{holders, locate};
+use fluxmorph_geometry::{Mesh, RegionId, millimetres};
+
+use super::entries::material;
 use super::open;
 use crate::config::{Config, Diagnostic, SourceMap};
 
@@ -35,4 +38,43 @@ pub(super) fn faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh
         }
     }
     faults
+}
+
+/// Probe points on a face across which B jumps: that of one side is measured there.
+pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+    let regions = mesh.topology().region_names();
+    let mut warnings = Vec::new();
+    for probe in &config.probes {
+        // The first region is that of the first element, whose field is taken.
+        let mut around: BTreeMap<usize, Vec<RegionId>> = BTreeMap::new();
+        for (j, (e, _)) in holders(mesh, &probe.points) {
+            around.entry(j).or_default().push(mesh.topology().region_of()[e.index()]);
+        }
+        for (j, own) in around {
+            let name = |region: RegionId| regions[region.index()].as_str();
+            let other = own.iter().copied().find(|&other| jumps(config, name(own[0]), name(other)));
+            warnings.extend(other.map(|other| {
+                let (taken, other) = (name(own[0]), name(other));
+                format!(
+                    "the point {} of the probe `{}` lies between `{taken}` and `{other}`, where B jumps: it is that in `{taken}`; move the \
+                     point to the side that is meant",
+                    millimetres(probe.points[j]),
+                    probe.name
+                )
+            }));
+        }
+    }
+    warnings
+}
+
+/// Whether the part of B along a face jumps between two regions: permeabilities, curves or magnets differ.
+fn jumps(config: &Config, region: &str, other: &str) -> bool {
+    let own = |region: &str| {
+        let entry = config.regions.get(region);
+        let curve = entry
+            .map(|own| &own.material)
+            .filter(|name| config.materials.get(*name).is_some_and(|m| m.saturates()));
+        (material(config, region).relative_permeability, curve, entry.and_then(|own| own.remanence))
+    };
+    own(region) != own(other)
 }

@@ -101,10 +101,10 @@ impl Side {
 
     /// Whether it is a wall beside these, one of which may be itself.
     fn is_wall(&self, all: &[Self]) -> bool {
-        let beats = |other: &Self| self.is_opposite(other) && other.standing >= self.standing;
+        let faces_another = |other: &Self| self.is_opposite(other) && other.standing >= self.standing;
         match self.standing {
             Standing::Wall => true,
-            Standing::Free | Standing::Normal => all.iter().any(beats),
+            Standing::Free | Standing::Normal => all.iter().any(faces_another),
             Standing::Observed | Standing::Reached => false,
         }
     }
@@ -150,7 +150,8 @@ impl Truncation {
         let whole = AxisBox { lower, upper };
         let observed = observed(config, mesh, &whole);
         let hull = Hull::new(mesh);
-        let sides = sides(&hull, model, (&sources, &observed), ROUNDING * norm(sub(upper, lower)));
+        let rounding = ROUNDING * norm(sub(upper, lower));
+        let sides = sides(&hull, model, (&sources, &observed), rounding);
         let places: Vec<&Place> = sources.iter().chain(&observed).collect();
         let mut nearest: Option<(&Side, f64)> = None;
         for side in sides.iter().filter(|side| side.is_wall(&sides)) {
@@ -161,7 +162,7 @@ impl Truncation {
             }
         }
         let (side, distance_m) = nearest?;
-        let source_size_m = size(&whole, &places, &sides);
+        let source_size_m = size(&whole, &places, &planes_of_symmetry(mesh, &sides, rounding));
         let near = if is_plane_device(&sides) { NEAR_IN_A_PLANE } else { NEAR };
         let (surface, at_m) = name(&hull, side);
         Some(Self { surface, at_m, distance_m, source_size_m, near })
@@ -250,8 +251,7 @@ fn name(hull: &Hull<'_>, side: &Side) -> (String, Option<Point>) {
 
 /// Half the diagonal of the box around all that makes, bends and observes the field, with what planes of symmetry cut off [m];
 /// `whole` is the box around the mesh.
-fn size(whole: &AxisBox, places: &[&Place], sides: &[Side]) -> f64 {
-    let planes = planes_of_symmetry(sides);
+fn size(whole: &AxisBox, places: &[&Place], planes: &[&Side]) -> f64 {
     let within = |x: Point| -> Point { std::array::from_fn(|d| x[d].clamp(whole.lower[d], whole.upper[d])) };
     let meshed = |x: Point| planes.iter().fold(within(x), |x, plane| plane.in_front(x));
     // What a plane of symmetry cuts goes on behind it, and what two of them cut behind both.
@@ -268,11 +268,12 @@ fn size(whole: &AxisBox, places: &[&Place], sides: &[Side]) -> f64 {
     0.5 * norm(sub(all.upper, all.lower))
 }
 
-/// Planes that are reached, but for those that face each other.
-fn planes_of_symmetry(sides: &[Side]) -> Vec<&Side> {
-    let reached = || sides.iter().filter(|side| side.standing >= Standing::Observed);
+/// Planes that are reached and have the whole mesh on one side, but for those that face each other.
+fn planes_of_symmetry<'s>(mesh: &Mesh, sides: &'s [Side], rounding: f64) -> Vec<&'s Side> {
+    let reached = || sides.iter().filter(|side| side.standing >= Standing::Observed && side.normal.is_some());
     let is_lone = |side: &&Side| !reached().any(|other| side.is_opposite(other));
-    reached().filter(|side| side.normal.is_some()).filter(is_lone).collect()
+    let is_outermost = |side: &&Side| mesh.points().iter().all(|&x| side.beyond(x) <= rounding);
+    reached().filter(is_lone).filter(is_outermost).collect()
 }
 
 /// Whether coils and matter reach from one side of the mesh to the one that faces it.
@@ -292,11 +293,10 @@ fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Place> {
     let own = functionals(config).into_iter().filter(|(_, own)| is_of_places(own.kind));
     let regions = own.filter_map(|(_, own)| topology.region(own.region.as_ref()?).ok());
     let of_regions = regions.map(|region| Place::of_nodes(mesh, topology.elements_of(region), []));
-    let of_probes = config.probes.iter().map(|probe| Place::Points(probe.points.clone()));
-    let of_expansions =
-        config.multipoles.iter().map(|set| Place::Ball { center: set.center, radius: set.radius });
+    let of_probes = config.probes.iter().map(|probe| Place::of_points(probe.points.clone()));
+    let of_expansions = config.multipoles.iter().map(|set| Place::of_ball(set.center, set.radius));
     let fills_mesh = |place: &Place| {
-        let AxisBox { lower, upper } = place.bounds();
+        let AxisBox { lower, upper } = place.bounds;
         (0..3).all(|d| lower[d] <= whole.lower[d] && upper[d] >= whole.upper[d])
     };
     of_regions.chain(of_probes).chain(of_expansions).filter(|place| !fills_mesh(place)).collect()

@@ -3,12 +3,14 @@
 //! It is the mesh that was solved on: a region that its impedance surface replaces is not in it. Coordinates are in the unit
 //! of the mesh file, and in millimetres where the mesh was generated.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, stl_bytes};
-use fluxmorph_geometry::{Mesh, MeshError};
+use fluxmorph_geometry::topology::{Facet, face_key};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 
-use crate::build::mesh;
+use crate::build::{is_air, mesh};
 use crate::config::{Config, LengthUnit};
 use crate::error::Error;
 use crate::files::{RunDirectory, surface_files};
@@ -42,7 +44,7 @@ pub(crate) fn write(
             ));
             continue;
         }
-        match stl_bytes(mesh, triangles, unit.metres()) {
+        match stl_bytes(mesh, &outwards(config, mesh.topology(), triangles), unit.metres()) {
             Ok(bytes) => directory.write(&directory.surface(&file), &bytes)?,
             Err(error) => observer.warning(&format!("the surface `{name}` is not written: {error}")),
         }
@@ -54,4 +56,26 @@ pub(crate) fn write(
 fn gmsh_file(mesh: &Mesh, unit: LengthUnit) -> Result<Vec<u8>, MeshError> {
     let large = mesh.topology().tets().len() > LARGEST_TEXT;
     msh_bytes(mesh, unit.metres(), if large { MshEncoding::Binary } else { MshEncoding::Ascii })
+}
+
+/// Triangles of a mesh with their normals out of what is no air, whatever their order in a file, and between two bodies out of the one
+/// that is named first. Those of a conductor that its surface replaces, which is not in the mesh, keep their order.
+fn outwards(config: &Config, topology: &Topology, triangles: &[[NodeId; 3]]) -> Vec<[NodeId; 3]> {
+    let facets: HashMap<[NodeId; 3], &Facet> =
+        topology.facets().iter().map(|facet| (face_key(facet.nodes), facet)).collect();
+    let is_air: Vec<bool> = topology.region_names().iter().map(|name| is_air(config, name)).collect();
+    let rank = |e: ElementId| {
+        let region = topology.region_of()[e.index()].index();
+        (is_air[region], region)
+    };
+    let turned = |triangle: &[NodeId; 3]| match facets.get(&face_key(*triangle)) {
+        Some(Facet { nodes: [a, b, c], inside, outside: Some(outside) })
+            if rank(*outside) < rank(*inside) =>
+        {
+            [*a, *c, *b]
+        }
+        Some(facet) if facet.outside.is_some() || !rank(facet.inside).0 => facet.nodes,
+        _ => *triangle,
+    };
+    triangles.iter().map(turned).collect()
 }

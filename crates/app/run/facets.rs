@@ -182,8 +182,8 @@ fn designed_nodes(config: &Config, topology: &Topology) -> Vec<NodeId> {
     surfaces.flatten().flatten().copied().collect()
 }
 
-/// What no refinement takes away, in words; of these objectives of one design or of two, and of what is reported that which changes
-/// most.
+/// What no refinement takes away, in words, with a cure where it matters; of these objectives of one design or of two, and of what is
+/// reported that which changes most.
 fn described(found: &CurvedFacets, objectives: &[f64], most: Option<&(String, f64)>) -> String {
     let head = format!(
         "`{}` is curved, and its facets are up to {:.3} mm off it, at {}",
@@ -216,10 +216,13 @@ fn described(found: &CurvedFacets, objectives: &[f64], most: Option<&(String, f6
              to see what it does"
         );
     }
+    let largest = objectives.iter().map(|value| value.abs()).fold(0.0, f64::max);
+    let of_largest = found.change.into_iter().flatten().map(|change| change.abs() / largest);
+    let matters = of_largest.chain(most.map(|own| own.1.abs())).any(|share| share >= MATTERS);
     format!(
-        "{head}: on it in the mean they change {}, which no error bar counts and no refinement takes away; begin with smaller faces \
-         there",
-        changed.join(", and ")
+        "{head}: on it in the mean they change {}, which no error bar counts and no refinement takes away{}",
+        changed.join(", and "),
+        if matters { "; begin with smaller faces there" } else { "" }
     )
 }
 

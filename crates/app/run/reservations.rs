@@ -65,8 +65,10 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
 
 /// An objective that is to be made large and is negative at the initial design.
 pub(super) fn wrong_sign(config: &Config, objective: &ObjectiveResult) -> Option<String> {
-    let goal = config.objective.as_ref()?.goal;
-    (goal == Goal::Maximise && objective.initial < 0.0).then(|| {
+    let own = config.objective.as_ref()?;
+    // A term that counts against the others makes the sum negative, whatever their directions.
+    let has_price = own.terms().iter().any(|term| term.weight < 0.0);
+    (own.goal == Goal::Maximise && !has_price && objective.initial < 0.0).then(|| {
         format!(
             "the objective is {:.4e} at the initial design, and to maximise it is to make it smaller in size first: for more of \
              it, reverse its direction or minimise it",

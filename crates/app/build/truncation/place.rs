@@ -12,16 +12,26 @@ use fluxmorph_solver::coil::Racetrack;
 use super::Side;
 
 /// Where a field is made, bent or observed.
-pub(super) enum Place {
+pub(super) struct Place {
+    /// The box around it.
+    pub(super) bounds: AxisBox,
+    form: Form,
+}
+
+enum Form {
     /// Nodes of the mesh, or the points of a probe [m].
     Points(Vec<Point>),
     /// What an expansion reaches [m].
     Ball { center: Point, radius: f64 },
-    /// The edges of an analytic winding [m], and the box around it.
-    Winding { edges: Vec<[Point; 2]>, bounds: AxisBox },
+    /// The edges of an analytic winding [m].
+    Winding(Vec<[Point; 2]>),
 }
 
 impl Place {
+    pub(super) fn of_points(points: Vec<Point>) -> Self {
+        Self { bounds: AxisBox::around(&points), form: Form::Points(points) }
+    }
+
     /// The nodes of elements, and others.
     pub(super) fn of_nodes(
         mesh: &Mesh,
@@ -30,34 +40,29 @@ impl Place {
     ) -> Self {
         let of_elements = elements.into_iter().flat_map(|e| mesh.topology().tets()[e.index()]);
         let nodes: BTreeSet<NodeId> = of_elements.chain(others).collect();
-        Self::Points(nodes.into_iter().map(|n| mesh.point(n)).collect())
+        Self::of_points(nodes.into_iter().map(|n| mesh.point(n)).collect())
+    }
+
+    pub(super) fn of_ball(center: Point, radius: f64) -> Self {
+        Self { bounds: AxisBox::around(&[center]).grown(radius), form: Form::Ball { center, radius } }
     }
 
     pub(super) fn of_winding(coil: &Racetrack) -> Self {
         let [lower, upper] = coil.bounding_box();
-        Self::Winding { edges: coil.edges(), bounds: AxisBox { lower, upper } }
+        Self { bounds: AxisBox { lower, upper }, form: Form::Winding(coil.edges()) }
     }
 
-    /// Whether anything is there.
+    /// Whether nothing is there.
     pub(super) fn is_empty(&self) -> bool {
-        matches!(self, Self::Points(points) if points.is_empty())
-    }
-
-    /// The box around it.
-    pub(super) fn bounds(&self) -> AxisBox {
-        match self {
-            Self::Points(points) => AxisBox::around(points),
-            Self::Ball { center, radius } => AxisBox::around(&[*center]).grown(*radius),
-            Self::Winding { bounds, .. } => *bounds,
-        }
+        matches!(&self.form, Form::Points(points) if points.is_empty())
     }
 
     /// Its points, or those of the box around it.
     pub(super) fn corners(&self) -> Vec<Point> {
-        match self {
-            Self::Points(points) => points.clone(),
-            Self::Ball { .. } | Self::Winding { .. } => {
-                let AxisBox { lower, upper } = self.bounds();
+        match &self.form {
+            Form::Points(points) => points.clone(),
+            Form::Ball { .. } | Form::Winding(_) => {
+                let AxisBox { lower, upper } = self.bounds;
                 let corner =
                     |k: usize| std::array::from_fn(|d| if k >> d & 1 == 0 { lower[d] } else { upper[d] });
                 (0..8).map(corner).collect()
@@ -67,7 +72,7 @@ impl Place {
 
     /// Its distance from a side [m]; beyond `far` a lower bound of it, which is at least `far`.
     pub(super) fn distance(&self, mesh: &Mesh, side: &Side, far: f64) -> f64 {
-        if self.bounds().square_gap(&side.bounds) > far * far {
+        if self.bounds.square_gap(&side.bounds) > far * far {
             return far;
         }
         let least = |points: &[Point], far: f64| {
@@ -75,15 +80,13 @@ impl Place {
             let near: Vec<Point> = points.iter().copied().filter(near).collect();
             depths(mesh, &side.triangles, &near, far).into_iter().fold(far, f64::min)
         };
-        match self {
-            Self::Points(points) => least(points, far),
-            Self::Ball { center, radius } => (least(&[*center], far + radius) - radius).max(0.0),
-            Self::Winding { edges, .. } => {
-                let mut points = edges.as_flattened().to_vec();
-                if let Some(normal) = side.normal {
-                    points.extend(edges.iter().filter_map(|edge| crossing(*edge, normal, side.patch.place)));
-                }
-                least(&points, far)
+        match &self.form {
+            Form::Points(points) => least(points, far),
+            Form::Ball { center, radius } => (least(&[*center], far + radius) - radius).max(0.0),
+            Form::Winding(edges) => {
+                let crossings =
+                    edges.iter().filter_map(|edge| crossing(*edge, side.normal?, side.patch.place));
+                least(&edges.as_flattened().iter().copied().chain(crossings).collect::<Vec<_>>(), far)
             }
         }
     }

@@ -97,9 +97,11 @@ fn keys_of_the_drive(rules: Rules) -> Rules {
         json!({ "dependentRequired": { "voltage": ["turns"], "resistance": ["turns"] } }),
     ];
     let one_turn = json!({ "properties": { "turns": { "const": 1 } } });
-    let rules = rules.add(json!({ "if": solid, "then": one_turn, "else": { "allOf": turns } }));
-    rules.needs("series_inductance", &["voltage"]).needs("series_capacitance", &["voltage"])
+    rules.add(json!({ "if": solid, "then": one_turn, "else": { "allOf": turns } }))
 }
+
+/// Keys of a coil that a voltage drives, in `[[coils]]` or under a load.
+pub(super) const IN_SERIES: [&str; 2] = ["series_inductance", "series_capacitance"];
 
 table! {
     /// The keys that say where the current flows, for all shapes together.
@@ -358,12 +360,7 @@ impl Coil {
             let message = format!("`{}.ampere_turns` is 0 A: the coil makes no field", section.path());
             section.wrong("ampere_turns", message, "any current but 0 A, or turns of an open coil");
         }
-        let needs = [
-            ("voltage", "turns"),
-            ("resistance", "turns"),
-            ("series_inductance", "voltage"),
-            ("series_capacitance", "voltage"),
-        ];
+        let needs = [("voltage", "turns"), ("resistance", "turns")];
         let is_there = |key: &str| section.has(key) || is_solid && key == "turns";
         for (key, other) in needs.into_iter().filter(|(key, other)| section.has(key) && !is_there(other)) {
             let message = format!("`{}.{key}` has no use without `{other}`", section.path());
@@ -403,6 +400,7 @@ impl Group for CoilShape {
 impl CoilShape {
     fn analytic(written: ShapeKeys, section: &Section<'_>) -> Self {
         let ShapeKeys { shape, center, axis, direction, half_window, radius, width, height, .. } = written;
+        let is_known = shape.is_some();
         let shape = shape.unwrap_or(ShapeWord::Racetrack);
         if written.terminals.is_some() && !section.has("region") {
             section.wrong(
@@ -415,7 +413,8 @@ impl CoilShape {
         let across = if shape == ShapeWord::Circular { ("radius", "\"60 mm\"") } else { window };
         let center_example = "[\"0 mm\", \"0 mm\", \"60 mm\"]";
         let required = [("center", center_example), ("width", "\"20 mm\""), ("height", "\"40 mm\""), across];
-        for (key, example) in required.into_iter().filter(|(key, _)| !section.has(key)) {
+        // Which ones it needs, a shape that is missing or misspelt does not say.
+        for (key, example) in required.into_iter().filter(|(key, _)| is_known && !section.has(key)) {
             section.missing(&[key], &format!("{key} = {example}"));
         }
         let center = center.unwrap_or([f64::NAN; 3]);

@@ -7,7 +7,7 @@ use serde_json::json;
 use super::accuracy::Accuracy;
 use super::analysis::Analysis;
 use super::boundary::Boundaries;
-use super::coil::Coil;
+use super::coil::{Coil, IN_SERIES};
 use super::constraint::{Constraint, Limit};
 use super::design::Design;
 use super::force::ForceBody;
@@ -94,12 +94,20 @@ fn tables_together(rules: Rules) -> Rules {
     let with_loads = json!({ "required": ["loads", "analysis"], "properties": {
         "loads": { "minItems": 1 }, "analysis": several,
     } });
-    rules.needs("design", &["remesh"]).needs("morph", &["remesh"]).add(json!({ "not": with_loads })).add(
-        json!({
+    // Under a load a voltage may drive what a current drives in `[[coils]]`.
+    let in_series: BTreeMap<&str, [&str; 1]> = IN_SERIES.into_iter().map(|key| (key, ["voltage"])).collect();
+    rules
+        .needs("design", &["remesh"])
+        .needs("morph", &["remesh"])
+        .add(json!({ "not": with_loads }))
+        .add(json!({
             "if": { "required": ["morph"], "not": { "anyOf": present(&OF_THE_FIELD) } },
             "else": { "required": ["analysis"] },
-        }),
-    )
+        }))
+        .add(json!({
+            "if": { "required": ["loads"] },
+            "else": { "properties": { "coils": { "items": { "dependentRequired": in_series } } } },
+        }))
 }
 
 impl Config {
@@ -108,6 +116,7 @@ impl Config {
         self.check_analysis(root);
         // Unknown frequencies are NaN: nothing is said of them, and nothing follows from them.
         self.check_loads(root);
+        self.check_series(root);
         let frequencies = self.frequencies();
         let is_known = root.has("analysis") && frequencies.iter().all(|frequency| !frequency.is_nan());
         let frequencies = if is_known { &frequencies[..] } else { &[] };

@@ -226,8 +226,11 @@ impl Constraint {
 
     /// Whether a constraint of the results is this one, or one of both of a thickness.
     pub fn is_called(&self, name: &str) -> bool {
-        let side = name.strip_prefix(self.name.as_str());
-        side.is_some_and(|side| ["", "_minimum", "_maximum"].contains(&side))
+        let sides: &[&str] = match &self.limit {
+            Limit::Functional { .. } => &[""],
+            Limit::Thickness { .. } => &["", "_minimum", "_maximum"],
+        };
+        name.strip_prefix(self.name.as_str()).is_some_and(|side| sides.contains(&side))
     }
 }
 

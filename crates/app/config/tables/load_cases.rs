@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use super::coil::IN_SERIES;
 use super::config::Config;
 use super::load::LoadCase;
 use crate::config::section::Section;
@@ -32,6 +33,18 @@ impl Config {
     /// Whether a field alternates: one of the frequencies is above zero.
     pub fn alternates(&self) -> bool {
         self.load_cases().iter().any(|case| case.frequency > 0.0)
+    }
+
+    /// What is in series with a coil counts where a voltage drives it.
+    pub(super) fn check_series(&self, root: &Section<'_>) {
+        for (k, coil) in self.coils.iter().enumerate().filter(|(_, coil)| coil.voltage.is_none()) {
+            let is_driven = self.loads.iter().any(|load| load.voltage.contains_key(&coil.name));
+            let Some(section) = root.inner(&format!("coils[{k}]")).filter(|_| !is_driven) else { continue };
+            for key in IN_SERIES.into_iter().filter(|key| section.has(key) && !section.has("voltage")) {
+                let message = format!("`{}.{key}` has no use without `voltage`", section.path());
+                section.wrong(key, message, "voltage beside it or under a load, or no such key");
+            }
+        }
     }
 
     /// What the loads ask of each other and of the analysis.

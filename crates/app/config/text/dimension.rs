@@ -63,7 +63,7 @@ dimensions! {
     /// A length [m].
     Length = "a length", in "m", such as "10 mm":
         decimal("m", 0), decimal("cm", -2), decimal("mm", -3), decimal("um", -6), decimal("\u{b5}m", -6),
-        decimal("\u{3bc}m", -6), scaled("in", 0.0254);
+        scaled("in", 0.0254);
     /// A frequency [Hz].
     Frequency = "a frequency", in "Hz", such as "60 Hz":
         decimal("Hz", 0), decimal("mHz", -3), decimal("kHz", 3), decimal("MHz", 6);
@@ -78,7 +78,7 @@ dimensions! {
         decimal("A", 0), decimal("mA", -3), decimal("kA", 3), decimal("MA", 6), decimal("AT", 0), decimal("kAT", 3);
     /// A magnetic flux density [T].
     FluxDensity = "a flux density", in "T", such as "5 mT":
-        decimal("T", 0), decimal("mT", -3), decimal("uT", -6), decimal("\u{b5}T", -6), decimal("\u{3bc}T", -6),
+        decimal("T", 0), decimal("mT", -3), decimal("uT", -6), decimal("\u{b5}T", -6),
         decimal("nT", -9), decimal("G", -4);
     /// An angle [rad].
     Angle = "an angle", in "rad", such as "30 deg":
@@ -109,7 +109,8 @@ dimensions! {
         decimal("V", 0), decimal("mV", -3), decimal("kV", 3);
     /// A resistance [Ω].
     Resistance = "a resistance", in "\u{3a9}", such as "0.2 ohm":
-        decimal("\u{3a9}", 0), decimal("ohm", 0), decimal("uohm", -6), decimal("mohm", -3), decimal("kohm", 3);
+        decimal("\u{3a9}", 0), decimal("ohm", 0), decimal("uohm", -6), decimal("mohm", -3), decimal("kohm", 3),
+        decimal("\u{b5}\u{3a9}", -6), decimal("m\u{3a9}", -3), decimal("k\u{3a9}", 3);
     /// An inductance [H].
     Inductance = "an inductance", in "H", such as "10 uH":
         decimal("H", 0), decimal("mH", -3), decimal("uH", -6), decimal("\u{b5}H", -6), decimal("nH", -9);

@@ -76,6 +76,9 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             help,
         });
     }
+    // The Greek letters that look like the signs of micro and ohm are meant as these.
+    let unit_text = unit_text.replace('\u{3bc}', "\u{b5}").replace('\u{2126}', "\u{3a9}");
+    let unit_text = unit_text.as_str();
     let Some(unit) = UNITS.iter().find(|unit| unit.name == unit_text) else {
         let known: Vec<_> = dimension.units().collect();
         let hint = match meant(unit_text, &known) {
@@ -211,6 +214,9 @@ mod tests {
             ("1.5e1 cm", Length, 0.15),
             ("3 um", Length, 3e-6),
             ("3 \u{b5}m", Length, 3e-6),
+            ("3 \u{3bc}H", Inductance, 3e-6),
+            ("5 m\u{2126}", Resistance, 5e-3),
+            ("5 \u{3bc}\u{3a9}", Resistance, 5e-6),
             (".5 m", Length, 0.5),
             ("5. m", Length, 5.0),
             ("7e6 S/m", Conductivity, 7e6),

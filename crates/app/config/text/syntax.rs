@@ -1,7 +1,7 @@
 //! What is wrong where a text is no TOML: the parser's own words at its own place, one fault a line.
 //!
-//! Slips that everybody makes get advice: a quote or a list that is not closed, a number with a unit and without quotes, and
-//! a key or table that is there twice.
+//! Slips that everybody makes get advice: a quote or a list that is not closed, a number with a unit and without quotes, a key or
+//! table that is there twice, and characters that a text processor put in the place of others.
 
 use std::ops::Range;
 
@@ -49,14 +49,35 @@ pub(super) fn diagnostics(document: usize, text: &str, errors: &[toml::de::Error
     found
 }
 
-/// What to do about a text or a quantity without its quotes.
+/// What to do about a text or a quantity without its quotes, and about characters that no one types.
 fn advice(text: &str, range: &Range<usize>, line: &str) -> Option<String> {
     let value = text.get(range.clone()).unwrap_or_default();
+    let first = text.get(range.start..).and_then(|rest| rest.chars().next());
+    if let Some(advice) = first.into_iter().chain(value.chars()).find_map(foreign) {
+        return Some(advice);
+    }
     if is_number_with_unit(value) {
         return Some(format!("put quotes around it: \"{}\"", shown(value)));
     }
     let is_open = line.matches('"').count() % 2 == 1 && !line.contains("\"\"\"");
     is_open.then(|| "a text needs a quote at each of its ends".to_owned())
+}
+
+/// What to do about a character that stands for another one, or that is not seen.
+fn foreign(character: char) -> Option<String> {
+    match character {
+        '\u{2018}'..='\u{201F}' | '\u{AB}' | '\u{BB}' => {
+            Some(format!("{character} is no quote of TOML: type \" or '"))
+        }
+        '\u{2010}'..='\u{2015}' | '\u{2212}' => Some(format!("{character} is no sign of TOML: type -")),
+        _ if !character.is_ascii() && character.is_whitespace() => {
+            Some(format!("this blank is the character U+{:04X}: type a plain one", u32::from(character)))
+        }
+        '\u{AD}' | '\u{200B}'..='\u{200F}' | '\u{2060}' | '\u{FEFF}' => {
+            Some(format!("here is a character that is not seen, U+{:04X}: take it out", u32::from(character)))
+        }
+        _ => None,
+    }
 }
 
 /// A text of several lines that is not closed, with the place where it begins.

@@ -56,6 +56,9 @@ impl Criterion {
         let terms = objective.terms();
         let is_swept = |k: &usize| keys.contains(&format!("objective.terms.{k}.weight").as_str());
         let (mut order, others): (Vec<usize>, Vec<usize>) = (0..terms.len()).partition(is_swept);
+        if order.is_empty() {
+            return None;
+        }
         order.extend(others);
         let &[first, second, ..] = order.as_slice() else { return None };
         Some([first.min(second), first.max(second)].map(|k| Self::of_term(objective, k)))
@@ -201,5 +204,7 @@ mod tests {
             None,
             "one value is no sweep"
         );
+        let current = &["coils[0].ampere_turns=20 kA,40 kA"];
+        assert_eq!(pair("shield_two_frequencies.toml", current), None, "no weight is swept");
     }
 }

@@ -48,7 +48,7 @@ pub(super) fn figures(data: &RunData) -> Markup {
         rows.first().map(|row| row.constraints.keys().collect()).unwrap_or_default();
     for name in constraints.into_iter().take(MOST_CONSTRAINTS) {
         let plain = name.strip_prefix("c_").unwrap_or(name);
-        let title = format!("constraint {plain}: (value − bound) / bound");
+        let title = format!("constraint {plain}: how far beyond its bound, relative to that");
         let mut own = series(&title, &|row| row.constraints.get(name).copied());
         own.bound = Some(0.0);
         all.push(("constraint", own));

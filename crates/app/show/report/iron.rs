@@ -32,9 +32,13 @@ pub(super) fn cards(data: &RunData) -> Vec<Card> {
         ("force", format!("({x}, {y}, {z}) N"), format!("on {}, of the meshed part{state}", body.name))
     };
     let mut cards: Vec<Card> = result.forces.iter().take(MOST_CARDS).map(of_body).collect();
-    let regions = result.saturation.iter().flat_map(|saturation| &saturation.regions);
-    let highest = regions.max_by(|a, b| a.highest_b_t.total_cmp(&b.highest_b_t));
-    cards.extend(highest.map(|region| {
+    let states = State::all(result);
+    let regions = states.iter().flat_map(|state| {
+        let own = state.saturation.into_iter().flat_map(|saturation| &saturation.regions);
+        own.map(move |region| (region, behind_title(state)))
+    });
+    let highest = regions.max_by(|a, b| a.0.highest_b_t.total_cmp(&b.0.highest_b_t));
+    cards.extend(highest.map(|(region, state)| {
         let end = region.table_ends_b_t.map(|end| format!(", whose curve ends at {} T", trim_zeros(end, 3)));
         let remark = format!("in {}{}{state}", region.region, end.unwrap_or_default());
         ("highest B in iron", format!("{} T", number(region.highest_b_t, 3)), remark)
