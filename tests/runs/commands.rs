@@ -3,10 +3,12 @@
 use std::path::Path;
 
 use super::plausible::{set, texts};
-use crate::support::folder::{RunFolder, count, files_below, list, named, number, numbers, vectors};
+use crate::support::folder::{
+    RunFolder, count, files_below, list, named, number, numbers, read_text, vectors,
+};
 use crate::support::program::{command, finish, fluxmorph, folder};
-use crate::support::repository;
 use crate::support::shield::{Model, height, on_quick, plate_bottom, quick};
+use crate::support::{changed, repository};
 
 /// A design as a file that `--design` takes.
 fn design_file(home: &Path, design: &[f64]) -> String {
@@ -208,19 +210,22 @@ fn a_probe_on_a_face_of_iron_is_asked_about() {
 fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
     let home = folder();
     let out = home.path().join("out");
-    let asks = |objective: &str| {
-        let coarse = ["mesh.boxes.refinement=0.5", "output.verify_refinement=0", objective];
+    let written = "direction = [0, 0, -1]                            # towards the core\n";
+    let text = read_text(&repository("configs/actuator.toml"));
+    let asks = |text: &str, objective: &str| {
+        let config = home.path().join("actuator.toml");
+        std::fs::write(&config, changed(text, &[(written, objective)])).expect("written");
+        let coarse = ["mesh.boxes.refinement=0.5", "output.verify_refinement=0"];
         let further = ["--out", out.to_str().expect("UTF-8"), "--force", "--max-evaluations", "1"];
-        let config = repository("configs/actuator.toml");
         finish(command(&[&"run", &config]).args(further).args(set(&coarse))).exits_with(1);
         texts(&RunFolder(out.clone()).result()["warnings"]).contains("reverse its direction or minimise it")
     };
-    assert!(asks("objective.direction=[0, 0, 1]") && !asks("objective.direction=[0, 0, -1]"));
+    assert!(asks(&text, "direction = [0, 0, 1]\n") && !asks(&text, "direction = [0, 0, -1]\n"));
     // What counts against the others has no direction to reverse.
-    let own = "kind = \"force\", region = \"armature\"";
-    let terms =
-        format!("[{{{own}, direction = [0, 0, -1]}}, {{{own}, direction = [0, 0, -1], weight = -2}}]");
-    assert!(!asks(&format!("objective={{goal = \"maximise\", terms = {terms}}}")));
+    let own = "kind = \"force\"\nregion = \"armature\"\n";
+    let term =
+        |weight: &str| format!("[[objective.terms]]\n{own}direction = [0, 0, -1]\nweight = {weight}\n");
+    assert!(!asks(&changed(&text, &[(own, "")]), &[term("1"), term("-2")].concat()));
 }
 
 #[test]

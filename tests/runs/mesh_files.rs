@@ -93,7 +93,8 @@ fn surfaces_of_bodies_are_written_out_of_them() {
         let bytes = msh_bytes(mesh, 1e-3, MshEncoding::Ascii).expect("finite");
         fs::write(home.path().join("device.msh"), bytes).expect("written");
         let out = home.path().join("out");
-        let further = ["--force", "--set", "analysis.frequency=0", "--set", "output.stl=[\"plate_bottom\"]"];
+        let further =
+            ["--force", "--set", "analysis.elements=edge", "--set", "output.stl=[\"plate_bottom\"]"];
         finish(command(&[&"solve", &config, &"--out", &out]).args(further)).exits_with(0);
         fs::read(out.join("optimum_plate_bottom.stl")).expect("written")
     };

@@ -72,9 +72,9 @@ table! {
         /// Resistance of the wire and of what is in series [Ω]; of a solid conductor the latter alone. Above zero for a coil of
         /// strands that a voltage drives at 0 Hz. Default 0.
         resistance: Option<f64> = quantity(Resistance, NOT_NEGATIVE);
-        /// Of a voltage-driven coil: an inductance in series [H]. Default 0.
+        /// Of a coil that a voltage drives, here or under a load: an inductance in series [H]. Default 0.
         series_inductance: Option<f64> = quantity(Inductance, NOT_NEGATIVE);
-        /// Of a voltage-driven coil: a capacitance in series [F], at frequencies above 0.
+        /// Of a coil that a voltage drives, here or under a load: a capacitance in series [F], at frequencies above 0.
         series_capacitance: Option<f64> = quantity(Capacitance, POSITIVE);
         /// Phase of the current or voltage [rad].
         phase: f64 = quantity(Angle, FINITE) => 0.0;
