@@ -149,6 +149,13 @@ fn curved_and_oblique_walls_are_as_near_as_others() {
     same("turned", whole, &turned, 0.008);
     same("a quarter", [0.0; 2], &|x| x, 0.008);
     same("a quarter, turned", [0.0; 2], &turned, 0.008);
+    // A sector of 36°, which the square between two planes at right angles is folded to.
+    let sector = |x: Point| {
+        let [x, y, z] = round(x);
+        let (angle, radius) = (0.4 * y.atan2(x), x.hypot(y));
+        [radius * angle.cos(), radius * angle.sin(), z]
+    };
+    same("a sector", [0.0; 2], &sector, 0.008);
     same("a cylinder", whole, &round, 0.008);
     same("a ball", whole, &ball, 0.05 - 0.04f64.hypot(0.005));
 }

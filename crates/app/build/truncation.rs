@@ -10,7 +10,7 @@ use std::collections::HashSet;
 
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::soundness::{Hull, OpenPatch, open_patches};
-use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, add, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, millimetres};
 use fluxmorph_solver::coil::CoilShape;
@@ -35,8 +35,11 @@ const NEAR_IN_A_PLANE: f64 = 5.2;
 /// Sum of the area vectors of a plane side over its area, at least.
 const PLANE: f64 = 1.0 - 1e-6;
 
-/// Cosine between the normals of opposite sides, at most.
-const OPPOSITE: f64 = -0.99;
+/// Cosine between the normals of opposite sides, at most: within 0.8°, less than any sector has.
+const OPPOSITE: f64 = -0.9999;
+
+/// Cosine between the normals of sides at right angles, at most in size.
+const RIGHT: f64 = 1e-4;
 
 /// Share of the diagonal of the mesh that coordinates of a file may be off.
 const ROUNDING: f64 = 1e-9;
@@ -254,18 +257,42 @@ fn name(hull: &Hull<'_>, side: &Side) -> (String, Option<Point>) {
 fn size(whole: &AxisBox, places: &[&Place], planes: &[&Side]) -> f64 {
     let within = |x: Point| -> Point { std::array::from_fn(|d| x[d].clamp(whole.lower[d], whole.upper[d])) };
     let meshed = |x: Point| planes.iter().fold(within(x), |x, plane| plane.in_front(x));
-    // What a plane of symmetry cuts goes on behind it, and what two of them cut behind both.
+    // What a plane of symmetry cuts goes on behind it, and what two of them cut around their edge.
     let images = |x: Point| {
-        let behind = |k: usize| planes[..k].iter().chain(&planes[k + 1..]);
-        let of_plane = |k: usize| {
-            let image = planes[k].image(x);
-            behind(k).map(move |second| second.image(image)).chain([image])
-        };
-        AxisBox::around(&(0..planes.len()).flat_map(of_plane).chain([x]).collect::<Vec<_>>())
+        let behind = planes.iter().map(|plane| plane.image(x));
+        let behind = AxisBox::around(&behind.chain([x]).collect::<Vec<_>>());
+        let pairs = planes
+            .iter()
+            .enumerate()
+            .flat_map(|(k, first)| planes[..k].iter().map(move |second| [first, second]));
+        pairs.fold(behind, |all, [first, second]| all.with(&around_edge(first, second, x)))
     };
     let corners = places.iter().flat_map(|place| place.corners()).map(meshed);
     let all = corners.fold(AxisBox::around(&[]), |all, x| all.with(&images(x)));
     0.5 * norm(sub(all.upper, all.lower))
+}
+
+/// The box around the image of a point behind two planes at right angles; around all of its images in a sector between two others,
+/// which lie on a circle.
+fn around_edge(first: &Side, second: &Side, x: Point) -> AxisBox {
+    let (Some(n), Some(m)) = (first.normal, second.normal) else { return AxisBox::around(&[x]) };
+    let cosine = dot(n, m);
+    if cosine >= -OPPOSITE {
+        // One plane in two parts.
+        return AxisBox::around(&[x]);
+    }
+    if cosine.abs() <= RIGHT {
+        return AxisBox::around(&[second.image(first.image(x))]);
+    }
+    // The foot of the point on the edge has both distances zero.
+    let [b, c] = [first, second].map(|side| side.beyond(x));
+    let square_sine = 1.0 - cosine * cosine;
+    let [s, t] = [(cosine * c - b) / square_sine, (cosine * b - c) / square_sine];
+    let foot: Point = std::array::from_fn(|d| x[d] + s * n[d] + t * m[d]);
+    let radius = norm(sub(x, foot));
+    let axis = cross(n, m);
+    let half = axis.map(|own| radius * (1.0 - own * own / square_sine).max(0.0).sqrt());
+    AxisBox { lower: sub(foot, half), upper: add(foot, half) }
 }
 
 /// Planes that are reached and have the whole mesh on one side, but for those that face each other.
