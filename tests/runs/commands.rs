@@ -212,6 +212,8 @@ fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
     let out = home.path().join("out");
     let written = "direction = [0, 0, -1]                            # towards the core\n";
     let text = read_text(&repository("configs/actuator.toml"));
+    let curve = "steel_team20.csv";
+    std::fs::copy(repository("configs").join(curve), home.path().join(curve)).expect("copied");
     let asks = |text: &str, objective: &str| {
         let config = home.path().join("actuator.toml");
         std::fs::write(&config, changed(text, &[(written, objective)])).expect("written");

@@ -68,8 +68,9 @@ fn walls_are_known_by_where_they_are() {
     };
     let observed = with_probe("-380 mm");
     assert!(observed.0 == "z_min" && (0.015..0.025).contains(&observed.1), "{observed:?}");
-    // In a plane at which something is observed the device goes on behind it.
+    // In a plane at which something is observed the device goes on behind it; a scan may end at any wall.
     assert_ne!(with_probe("-400 mm").0, "z_min");
+    assert_eq!(with_probe("-400 mm\"], [\"0 mm\", \"0 mm\", \"-300 mm").0, "z_min");
 }
 
 /// A ring coil of 40 mm in air.

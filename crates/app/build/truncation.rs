@@ -6,7 +6,7 @@
 
 mod place;
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::soundness::{Hull, OpenPatch, open_patches};
@@ -112,9 +112,11 @@ impl Side {
         }
     }
 
-    /// Whether a place reaches it, to the rounding of coordinates [m].
-    fn is_reached(&self, mesh: &Mesh, place: &Place, rounding: f64) -> bool {
-        place.distance(mesh, self, 2.0 * rounding) <= rounding
+    /// Its distance from the nearest of some places; at least `far` beyond that [m]. What goes through a curved side does not count for
+    /// it.
+    fn distance(&self, mesh: &Mesh, places: &[&Place], (far, rounding): (f64, f64)) -> f64 {
+        let counts = |place: &&&Place| self.normal.is_some() || !place.reaches(mesh, self, rounding);
+        places.iter().filter(counts).fold(far, |far, place| place.distance(mesh, self, far))
     }
 
     /// A point on the other side of its plane is moved onto it, and all others kept [m].
@@ -159,7 +161,7 @@ impl Truncation {
         let mut nearest: Option<(&Side, f64)> = None;
         for side in sides.iter().filter(|side| side.is_wall(&sides)) {
             let far = nearest.map_or(f64::INFINITY, |(_, distance)| distance);
-            let distance = places.iter().fold(far, |far, place| place.distance(mesh, side, far));
+            let distance = side.distance(mesh, &places, (far, rounding));
             if distance < far {
                 nearest = Some((side, distance));
             }
@@ -213,7 +215,7 @@ fn sides(
         let all = |of: &HashSet<_>| side.triangles.iter().all(|&face| of.contains(&face_key(face)));
         let any = |of: &HashSet<_>| side.triangles.iter().any(|&face| of.contains(&face_key(face)));
         let is_reached_by =
-            |places: &[Place]| places.iter().any(|place| side.is_reached(mesh, place, rounding));
+            |places: &[Place]| places.iter().any(|place| place.reaches(mesh, &side, rounding));
         let is_covered = || side.patch.faces.iter().all(|&face| matter.contains(&faces[face].inside));
         let standing = if side.normal.is_none() {
             if is_covered() { Standing::Reached } else { Standing::Wall }
@@ -236,14 +238,22 @@ fn sides(
     open_patches(hull, &is_matter).into_iter().map(of).collect()
 }
 
-/// What a side is called; of one without a name with a place.
+/// What a side is called, by the surface that has most of it; of one without a name with a place.
 fn name(hull: &Hull<'_>, side: &Side) -> (String, Option<Point>) {
     let topology = hull.mesh().topology();
-    let first = face_key(hull.faces()[side.patch.faces[0]].nodes);
-    let holds = |name: &&str| {
-        topology.surface(name).is_ok_and(|triangles| triangles.iter().any(|t| face_key(*t) == first))
+    let own: HashSet<[NodeId; 3]> = side.triangles.iter().map(|&triangle| face_key(triangle)).collect();
+    let shared = |name: &str| {
+        let triangles = topology.surface(name).unwrap_or_default();
+        triangles.iter().filter(|&&triangle| own.contains(&face_key(triangle))).count()
     };
-    match topology.surface_names().find(holds) {
+    let mut largest = (0, None);
+    for name in topology.surface_names() {
+        let count = shared(name);
+        if count > largest.0 {
+            largest = (count, Some(name));
+        }
+    }
+    match largest.1 {
         Some(name) => (name.to_owned(), None),
         None => {
             let region = &topology.region_names()[side.patch.region.index()];
@@ -267,8 +277,8 @@ fn size(whole: &AxisBox, places: &[&Place], planes: &[&Side]) -> f64 {
             .flat_map(|(k, first)| planes[..k].iter().map(move |second| [first, second]));
         pairs.fold(behind, |all, [first, second]| all.with(&around_edge(first, second, x)))
     };
-    let corners = places.iter().flat_map(|place| place.corners()).map(meshed);
-    let all = corners.fold(AxisBox::around(&[]), |all, x| all.with(&images(x)));
+    let extremes = places.iter().flat_map(|place| place.extremes()).map(meshed);
+    let all = extremes.fold(AxisBox::around(&[]), |all, x| all.with(&images(x)));
     0.5 * norm(sub(all.upper, all.lower))
 }
 
@@ -320,7 +330,7 @@ fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Place> {
     let own = functionals(config).into_iter().filter(|(_, own)| is_of_places(own.kind));
     let regions = own.filter_map(|(_, own)| topology.region(own.region.as_ref()?).ok());
     let of_regions = regions.map(|region| Place::of_nodes(mesh, topology.elements_of(region), []));
-    let of_probes = config.probes.iter().map(|probe| Place::of_points(probe.points.clone()));
+    let of_probes = config.probes.iter().map(|probe| Place::of_probe(&probe.points));
     let of_expansions = config.multipoles.iter().map(|set| Place::of_ball(set.center, set.radius));
     let fills_mesh = |place: &Place| {
         let AxisBox { lower, upper } = place.bounds;
@@ -329,15 +339,22 @@ fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Place> {
     of_regions.chain(of_probes).chain(of_expansions).filter(|place| !fills_mesh(place)).collect()
 }
 
-/// Where windings, conductors and matter are, and conductors that their surfaces replace.
+/// Where windings, conductors and matter are, region by region, and conductors that their surfaces replace.
 fn sources(model: &FieldModel, mesh: &Mesh) -> Vec<Place> {
-    let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
-    let meshed = Place::of_nodes(mesh, wound_or_matter(model), replaced.flatten().copied());
+    let mut by_region: BTreeMap<usize, Vec<ElementId>> = BTreeMap::new();
+    for e in wound_or_matter(model) {
+        by_region.entry(model.topology().region_of()[e.index()].index()).or_default().push(e);
+    }
+    let meshed = by_region.into_values().map(|elements| Place::of_nodes(mesh, elements, []));
+    let replaced = model
+        .conductors()
+        .iter()
+        .map(|conductor| Place::of_nodes(mesh, [], conductor.surface.iter().flatten().copied()));
     let analytic = model.coils().iter().filter_map(|coil| match &coil.shape {
         CoilShape::Racetrack(coil) => Some(Place::of_winding(coil)),
         CoilShape::Region(_) | CoilShape::Solid(_) => None,
     });
-    analytic.chain([meshed]).collect()
+    analytic.chain(meshed).chain(replaced).collect()
 }
 
 /// Elements of windings and conductors, or that are not air.

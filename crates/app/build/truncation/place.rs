@@ -19,8 +19,10 @@ pub(super) struct Place {
 }
 
 enum Form {
-    /// Nodes of the mesh, or the points of a probe [m].
-    Points(Vec<Point>),
+    /// Nodes of elements [m].
+    Nodes(Vec<Point>),
+    /// The points of a probe [m].
+    Probe(Vec<Point>),
     /// What an expansion reaches [m].
     Ball { center: Point, radius: f64 },
     /// The edges of an analytic winding [m].
@@ -28,8 +30,8 @@ enum Form {
 }
 
 impl Place {
-    pub(super) fn of_points(points: Vec<Point>) -> Self {
-        Self { bounds: AxisBox::around(&points), form: Form::Points(points) }
+    pub(super) fn of_probe(points: &[Point]) -> Self {
+        Self { bounds: AxisBox::around(points), form: Form::Probe(points.to_vec()) }
     }
 
     /// The nodes of elements, and others.
@@ -40,7 +42,8 @@ impl Place {
     ) -> Self {
         let of_elements = elements.into_iter().flat_map(|e| mesh.topology().tets()[e.index()]);
         let nodes: BTreeSet<NodeId> = of_elements.chain(others).collect();
-        Self::of_points(nodes.into_iter().map(|n| mesh.point(n)).collect())
+        let points: Vec<Point> = nodes.into_iter().map(|n| mesh.point(n)).collect();
+        Self { bounds: AxisBox::around(&points), form: Form::Nodes(points) }
     }
 
     pub(super) fn of_ball(center: Point, radius: f64) -> Self {
@@ -54,19 +57,34 @@ impl Place {
 
     /// Whether nothing is there.
     pub(super) fn is_empty(&self) -> bool {
-        matches!(&self.form, Form::Points(points) if points.is_empty())
+        matches!(&self.form, Form::Nodes(points) if points.is_empty())
     }
 
-    /// Its points, or those of the box around it.
-    pub(super) fn corners(&self) -> Vec<Point> {
+    /// Points between which it lies [m].
+    pub(super) fn extremes(&self) -> Vec<Point> {
         match &self.form {
-            Form::Points(points) => points.clone(),
-            Form::Ball { .. } | Form::Winding(_) => {
-                let AxisBox { lower, upper } = self.bounds;
-                let corner =
-                    |k: usize| std::array::from_fn(|d| if k >> d & 1 == 0 { lower[d] } else { upper[d] });
-                (0..8).map(corner).collect()
+            Form::Nodes(points) | Form::Probe(points) => points.clone(),
+            Form::Winding(edges) => edges.as_flattened().to_vec(),
+            Form::Ball { center, radius } => {
+                let along = |k: usize, step: f64| {
+                    let mut x = *center;
+                    x[k] += step;
+                    x
+                };
+                (0..3).flat_map(|k| [along(k, -radius), along(k, *radius)]).collect()
             }
+        }
+    }
+
+    /// Whether it reaches a side, to the rounding of coordinates [m]; all points of a probe must lie on that, for a scan may end at
+    /// any wall.
+    pub(super) fn reaches(&self, mesh: &Mesh, side: &Side, rounding: f64) -> bool {
+        let far = 2.0 * rounding;
+        match &self.form {
+            Form::Probe(points) if self.bounds.square_gap(&side.bounds) <= far * far => {
+                depths(mesh, &side.triangles, points, far).into_iter().all(|depth| depth <= rounding)
+            }
+            _ => self.distance(mesh, side, far) <= rounding,
         }
     }
 
@@ -81,7 +99,7 @@ impl Place {
             depths(mesh, &side.triangles, &near, far).into_iter().fold(far, f64::min)
         };
         match &self.form {
-            Form::Points(points) => least(points, far),
+            Form::Nodes(points) | Form::Probe(points) => least(points, far),
             Form::Ball { center, radius } => (least(&[*center], far + radius) - radius).max(0.0),
             Form::Winding(edges) => {
                 let crossings =
