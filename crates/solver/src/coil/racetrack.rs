@@ -193,7 +193,7 @@ impl Racetrack {
     }
 
     /// Edges of a winding of flat facets inscribed in this one [m]: its contours at both ends, and what joins these along the axis.
-    /// A straight side has [`STRAIGHT`] of them and a quarter of a round corner [`ARC`], so that they leave out .12 % of its radius.
+    /// A straight side has eight of them and a quarter of a round corner sixteen, so that they leave out .12 % of its radius.
     pub fn edges(&self) -> Vec<[Point; 2]> {
         let place = |local: Point| add(self.frame.centre(), self.frame.vector(local));
         let mut edges = Vec::new();
