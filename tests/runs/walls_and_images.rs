@@ -111,9 +111,9 @@ fn curved_and_oblique_walls_are_as_near_as_others() {
     let lines = |from: f64, cells: u32| -> Vec<f64> {
         (0..=cells).map(|k| from + (half - from) * f64::from(k) / f64::from(cells)).collect()
     };
-    let wall = |[x, y]: [f64; 2], place: &dyn Fn(Point) -> Point| {
+    let wall = |[x, y, z]: Point, place: &dyn Fn(Point) -> Point| {
         let of = |from: f64| lines(from, if from == 0.0 { 6 } else { 12 });
-        let grid = Grid::new("grid", [of(x), of(y), of(-half)]).expect("a grid");
+        let grid = Grid::new("grid", [of(x), of(y), of(z)]).expect("a grid");
         let topology = grid.topology(&["air"], |_| RegionId(0)).expect("a region");
         let mesh = Mesh::new(Arc::new(topology), grid.points().into_iter().map(place).collect());
         let bytes = msh_bytes(&mesh.expect("a mesh"), 1e-3, MshEncoding::Ascii).expect("finite");
@@ -137,10 +137,11 @@ fn curved_and_oblique_walls_are_as_near_as_others() {
         let by = stretched(x.iter().fold(0.0, |most, c| c.abs().max(most)), norm(x)) * 50.0 / 48.0;
         x.map(|c| by * c)
     };
-    let whole = [-half; 2];
+    let whole = [-half; 3];
+    let quarter = [0.0, 0.0, -half];
     let [distance, size] = wall(whole, &|x| x);
     assert!((distance - 0.008).abs() < 1e-6 && (size / norm([0.04, 0.04, 0.005]) - 1.0).abs() < 1e-6);
-    let same = |name: &str, corner: [f64; 2], place: &dyn Fn(Point) -> Point, expected: f64| {
+    let same = |name: &str, corner: Point, place: &dyn Fn(Point) -> Point, expected: f64| {
         let [distance, own] = wall(corner, place);
         println!("{name}: {distance:.3e} m, {own:.3e} m");
         // Facets cut off up to 0.4 mm of a circle, and the winding's edges 0.05 mm.
@@ -148,15 +149,17 @@ fn curved_and_oblique_walls_are_as_near_as_others() {
         assert!((own / size - 1.0).abs() < 0.02, "{name}: {own} of {size}");
     };
     same("turned", whole, &turned, 0.008);
-    same("a quarter", [0.0; 2], &|x| x, 0.008);
-    same("a quarter, turned", [0.0; 2], &turned, 0.008);
+    same("a quarter", quarter, &|x| x, 0.008);
+    same("a quarter, turned", quarter, &turned, 0.008);
+    same("an octant", [0.0; 3], &|x| x, 0.008);
+    same("an octant, turned", [0.0; 3], &turned, 0.008);
     // A sector of 36°, which the square between two planes at right angles is folded to.
     let sector = |x: Point| {
         let [x, y, z] = round(x);
         let (angle, radius) = (0.4 * y.atan2(x), x.hypot(y));
         [radius * angle.cos(), radius * angle.sin(), z]
     };
-    same("a sector", [0.0; 2], &sector, 0.008);
+    same("a sector", quarter, &sector, 0.008);
     same("a cylinder", whole, &round, 0.008);
     same("a ball", whole, &ball, 0.05 - 0.04f64.hypot(0.005));
 }

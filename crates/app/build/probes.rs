@@ -40,9 +40,10 @@ pub(super) fn faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh
     faults
 }
 
-/// Probe points on a face across which B jumps: that of one side is measured there.
+/// Probes with points on faces across which B jumps: that of one side is measured there.
 pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
     let regions = mesh.topology().region_names();
+    let name = |region: RegionId| regions[region.index()].as_str();
     let mut warnings = Vec::new();
     for probe in &config.probes {
         // The first region is that of the first element, whose field is taken.
@@ -50,25 +51,32 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         for (j, (e, _)) in holders(mesh, &probe.points) {
             around.entry(j).or_default().push(mesh.topology().region_of()[e.index()]);
         }
-        for (j, own) in around {
-            let name = |region: RegionId| regions[region.index()].as_str();
-            let other = own.iter().copied().find(|&other| jumps(config, name(own[0]), name(other)));
-            warnings.extend(other.map(|other| {
-                let (taken, other) = (name(own[0]), name(other));
-                format!(
-                    "the point {} of the probe `{}` lies between `{taken}` and `{other}`, where B jumps: it is that in `{taken}`; move the \
-                     point to the side that is meant",
-                    millimetres(probe.points[j]),
-                    probe.name
-                )
-            }));
+        let mut between: BTreeMap<[&str; 2], Vec<usize>> = BTreeMap::new();
+        for (j, regions) in around {
+            let taken = name(regions[0]);
+            if let Some(other) = regions.iter().find(|&&other| flux_density_jumps(config, taken, name(other)))
+            {
+                between.entry([taken, name(*other)]).or_default().push(j);
+            }
         }
+        warnings.extend(between.into_iter().map(|([taken, other], points)| {
+            let more = match points.len() - 1 {
+                0 => String::new(),
+                more => format!(", and {more} more of them,"),
+            };
+            format!(
+                "the point {}{more} of the probe `{}` lies between `{taken}` and `{other}`, where B jumps: it is that in `{taken}`; move it \
+                 to the side that is meant",
+                millimetres(probe.points[points[0]]),
+                probe.name
+            )
+        }));
     }
     warnings
 }
 
 /// Whether the part of B along a face jumps between two regions: permeabilities, curves or magnets differ.
-fn jumps(config: &Config, region: &str, other: &str) -> bool {
+fn flux_density_jumps(config: &Config, region: &str, other: &str) -> bool {
     let own = |region: &str| {
         let entry = config.regions.get(region);
         let curve = entry

@@ -4,7 +4,7 @@
 //! Walls are the sides of the mesh, whatever their names and conditions, but planes of symmetry: those that coils, matter or what is
 //! observed reach; and those that flux passes at a right angle, unless such a plane, or one that is reached, lies opposite.
 
-mod place;
+mod site;
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -17,7 +17,7 @@ use fluxmorph_solver::coil::CoilShape;
 use fluxmorph_solver::{Boundary, FieldModel, Material};
 use serde::Serialize;
 
-use self::place::Place;
+use self::site::Site;
 use super::soundness::faces_of;
 use super::{Setup, functionals};
 use crate::config::{Config, ObjectiveKind};
@@ -37,6 +37,9 @@ const PLANE: f64 = 1.0 - 1e-6;
 
 /// Cosine between the normals of opposite sides, at most: within 0.8°, less than any sector has.
 const OPPOSITE: f64 = -0.9999;
+
+/// Planes of symmetry that images are taken in: three at most of those that meet in one point, and one more.
+const MOST_IMAGED: usize = 4;
 
 /// Cosine between the normals of sides at right angles, at most in size.
 const RIGHT: f64 = 1e-4;
@@ -102,6 +105,12 @@ impl Side {
         dot(self.patch.area_vector, other.patch.area_vector) < OPPOSITE * self.patch.area * other.patch.area
     }
 
+    /// Whether it lies in the plane of another one.
+    fn is_coplanar(&self, other: &Self, rounding: f64) -> bool {
+        self.normal.zip(other.normal).is_some_and(|(own, of)| dot(own, of) >= -OPPOSITE)
+            && self.beyond(other.patch.place).abs() <= rounding
+    }
+
     /// Whether it is a wall beside these, one of which may be itself.
     fn is_wall(&self, all: &[Self]) -> bool {
         let faces_another = |other: &Self| self.is_opposite(other) && other.standing >= self.standing;
@@ -112,15 +121,15 @@ impl Side {
         }
     }
 
-    /// Its distance from the nearest of some places; at least `far` beyond that [m]. What goes through a curved side does not count for
-    /// it.
-    fn distance(&self, mesh: &Mesh, places: &[&Place], (far, rounding): (f64, f64)) -> f64 {
-        let counts = |place: &&&Place| self.normal.is_some() || !place.reaches(mesh, self, rounding);
+    /// Its distance from the nearest of some sites [m], or `far` where none is nearer. What goes through a curved side does not count
+    /// for it.
+    fn distance(&self, mesh: &Mesh, places: &[&Site], (far, rounding): (f64, f64)) -> f64 {
+        let counts = |place: &&&Site| self.normal.is_some() || !place.reaches(mesh, self, rounding);
         places.iter().filter(counts).fold(far, |far, place| place.distance(mesh, self, far))
     }
 
     /// A point on the other side of its plane is moved onto it, and all others kept [m].
-    fn in_front(&self, x: Point) -> Point {
+    fn projected_inside(&self, x: Point) -> Point {
         let beyond = self.beyond(x).max(0.0);
         self.along_normal(x, -beyond)
     }
@@ -148,7 +157,7 @@ impl Truncation {
             return None;
         }
         let sources = sources(model, mesh);
-        if sources.iter().all(Place::is_empty) {
+        if sources.iter().all(Site::is_empty) {
             return None;
         }
         let [lower, upper] = mesh.bounding_box();
@@ -157,7 +166,7 @@ impl Truncation {
         let hull = Hull::new(mesh);
         let rounding = ROUNDING * norm(sub(upper, lower));
         let sides = sides(&hull, model, (&sources, &observed), rounding);
-        let places: Vec<&Place> = sources.iter().chain(&observed).collect();
+        let places: Vec<&Site> = sources.iter().chain(&observed).collect();
         let mut nearest: Option<(&Side, f64)> = None;
         for side in sides.iter().filter(|side| side.is_wall(&sides)) {
             let far = nearest.map_or(f64::INFINITY, |(_, distance)| distance);
@@ -198,7 +207,7 @@ impl Truncation {
 fn sides(
     hull: &Hull<'_>,
     model: &FieldModel,
-    (sources, observed): (&[Place], &[Place]),
+    (sources, observed): (&[Site], &[Site]),
     rounding: f64,
 ) -> Vec<Side> {
     let (mesh, faces) = (hull.mesh(), hull.faces());
@@ -214,8 +223,7 @@ fn sides(
         let side = Side::new(hull, patch);
         let all = |of: &HashSet<_>| side.triangles.iter().all(|&face| of.contains(&face_key(face)));
         let any = |of: &HashSet<_>| side.triangles.iter().any(|&face| of.contains(&face_key(face)));
-        let is_reached_by =
-            |places: &[Place]| places.iter().any(|place| place.reaches(mesh, &side, rounding));
+        let is_reached_by = |places: &[Site]| places.iter().any(|place| place.reaches(mesh, &side, rounding));
         let is_covered = || side.patch.faces.iter().all(|&face| matter.contains(&faces[face].inside));
         let standing = if side.normal.is_none() {
             if is_covered() { Standing::Reached } else { Standing::Wall }
@@ -235,7 +243,22 @@ fn sides(
     let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
     let replaced: HashSet<_> = replaced.map(|triangle| face_key(*triangle)).collect();
     let is_matter: Vec<bool> = faces.iter().map(|face| replaced.contains(&face_key(face.nodes))).collect();
-    open_patches(hull, &is_matter).into_iter().map(of).collect()
+    let mut sides: Vec<Side> = open_patches(hull, &is_matter).into_iter().map(of).collect();
+    // A hole may part a plane of symmetry, of which then not all parts are reached.
+    let reached: Vec<bool> = sides
+        .iter()
+        .map(|side| {
+            sides
+                .iter()
+                .any(|other| other.standing >= Standing::Observed && side.is_coplanar(other, rounding))
+        })
+        .collect();
+    for (side, _) in
+        sides.iter_mut().zip(reached).filter(|(side, reached)| *reached && side.standing < Standing::Observed)
+    {
+        side.standing = Standing::Observed;
+    }
+    sides
 }
 
 /// What a side is called, by the surface that has most of it; of one without a name with a place.
@@ -264,35 +287,36 @@ fn name(hull: &Hull<'_>, side: &Side) -> (String, Option<Point>) {
 
 /// Half the diagonal of the box around all that makes, bends and observes the field, with what planes of symmetry cut off [m];
 /// `whole` is the box around the mesh.
-fn size(whole: &AxisBox, places: &[&Place], planes: &[&Side]) -> f64 {
+fn size(whole: &AxisBox, places: &[&Site], planes: &[&Side]) -> f64 {
     let within = |x: Point| -> Point { std::array::from_fn(|d| x[d].clamp(whole.lower[d], whole.upper[d])) };
-    let meshed = |x: Point| planes.iter().fold(within(x), |x, plane| plane.in_front(x));
-    // What a plane of symmetry cuts goes on behind it, and what two of them cut around their edge.
+    let meshed = |x: Point| planes.iter().fold(within(x), |x, plane| plane.projected_inside(x));
+    // What planes of symmetry cut goes on behind each and behind several, and around the edge of two.
+    let planes = &planes[..planes.len().min(MOST_IMAGED)];
+    let pairs: Vec<[&Side; 2]> = planes
+        .iter()
+        .enumerate()
+        .flat_map(|(k, &first)| planes[..k].iter().map(move |&second| [first, second]))
+        .collect();
     let images = |x: Point| {
-        let behind = planes.iter().map(|plane| plane.image(x));
-        let behind = AxisBox::around(&behind.chain([x]).collect::<Vec<_>>());
-        let pairs = planes
-            .iter()
-            .enumerate()
-            .flat_map(|(k, first)| planes[..k].iter().map(move |second| [first, second]));
-        pairs.fold(behind, |all, [first, second]| all.with(&around_edge(first, second, x)))
+        let mut points = vec![x];
+        for plane in planes {
+            points.extend(points.iter().map(|&x| plane.image(x)).collect::<Vec<_>>());
+        }
+        pairs.iter().fold(AxisBox::around(&points), |all, pair| all.with(&around_edge(*pair, x)))
     };
     let extremes = places.iter().flat_map(|place| place.extremes()).map(meshed);
     let all = extremes.fold(AxisBox::around(&[]), |all, x| all.with(&images(x)));
     0.5 * norm(sub(all.upper, all.lower))
 }
 
-/// The box around the image of a point behind two planes at right angles; around all of its images in a sector between two others,
-/// which lie on a circle.
-fn around_edge(first: &Side, second: &Side, x: Point) -> AxisBox {
-    let (Some(n), Some(m)) = (first.normal, second.normal) else { return AxisBox::around(&[x]) };
+/// The box around all images of a point in a sector between two planes, which lie on a circle; around the point alone where they meet
+/// at right angles, or are one plane in two parts.
+fn around_edge([first, second]: [&Side; 2], x: Point) -> AxisBox {
+    let none = AxisBox::around(&[x]);
+    let (Some(n), Some(m)) = (first.normal, second.normal) else { return none };
     let cosine = dot(n, m);
-    if cosine >= -OPPOSITE {
-        // One plane in two parts.
-        return AxisBox::around(&[x]);
-    }
-    if cosine.abs() <= RIGHT {
-        return AxisBox::around(&[second.image(first.image(x))]);
+    if cosine.abs() <= RIGHT || cosine >= -OPPOSITE {
+        return none;
     }
     // The foot of the point on the edge has both distances zero.
     let [b, c] = [first, second].map(|side| side.beyond(x));
@@ -321,7 +345,7 @@ fn is_plane_device(sides: &[Side]) -> bool {
 
 /// The places at which B is observed: regions, expansions, and the points of probes. What fills the mesh, of which `whole` is the
 /// box, is no place.
-fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Place> {
+fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Site> {
     let topology = mesh.topology();
     let is_of_places = |kind: ObjectiveKind| {
         use ObjectiveKind::{FieldComponent, FluxDensitySquared, Homogeneity, TargetField};
@@ -329,10 +353,10 @@ fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Place> {
     };
     let own = functionals(config).into_iter().filter(|(_, own)| is_of_places(own.kind));
     let regions = own.filter_map(|(_, own)| topology.region(own.region.as_ref()?).ok());
-    let of_regions = regions.map(|region| Place::of_nodes(mesh, topology.elements_of(region), []));
-    let of_probes = config.probes.iter().map(|probe| Place::of_probe(&probe.points));
-    let of_expansions = config.multipoles.iter().map(|set| Place::of_ball(set.center, set.radius));
-    let fills_mesh = |place: &Place| {
+    let of_regions = regions.map(|region| Site::of_nodes(mesh, topology.elements_of(region), []));
+    let of_probes = config.probes.iter().map(|probe| Site::of_probe(&probe.points));
+    let of_expansions = config.multipoles.iter().map(|set| Site::of_ball(set.center, set.radius));
+    let fills_mesh = |place: &Site| {
         let AxisBox { lower, upper } = place.bounds;
         (0..3).all(|d| lower[d] <= whole.lower[d] && upper[d] >= whole.upper[d])
     };
@@ -340,18 +364,18 @@ fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Place> {
 }
 
 /// Where windings, conductors and matter are, region by region, and conductors that their surfaces replace.
-fn sources(model: &FieldModel, mesh: &Mesh) -> Vec<Place> {
+fn sources(model: &FieldModel, mesh: &Mesh) -> Vec<Site> {
     let mut by_region: BTreeMap<usize, Vec<ElementId>> = BTreeMap::new();
     for e in wound_or_matter(model) {
         by_region.entry(model.topology().region_of()[e.index()].index()).or_default().push(e);
     }
-    let meshed = by_region.into_values().map(|elements| Place::of_nodes(mesh, elements, []));
+    let meshed = by_region.into_values().map(|elements| Site::of_nodes(mesh, elements, []));
     let replaced = model
         .conductors()
         .iter()
-        .map(|conductor| Place::of_nodes(mesh, [], conductor.surface.iter().flatten().copied()));
+        .map(|conductor| Site::of_nodes(mesh, [], conductor.surface.iter().flatten().copied()));
     let analytic = model.coils().iter().filter_map(|coil| match &coil.shape {
-        CoilShape::Racetrack(coil) => Some(Place::of_winding(coil)),
+        CoilShape::Racetrack(coil) => Some(Site::of_winding(coil)),
         CoilShape::Region(_) | CoilShape::Solid(_) => None,
     });
     analytic.chain(meshed).chain(replaced).collect()

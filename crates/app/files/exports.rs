@@ -44,7 +44,7 @@ pub(crate) fn write(
             ));
             continue;
         }
-        match stl_bytes(mesh, &outwards(config, mesh.topology(), triangles), unit.metres()) {
+        match stl_bytes(mesh, &oriented_outwards(config, mesh.topology(), triangles), unit.metres()) {
             Ok(bytes) => directory.write(&directory.surface(&file), &bytes)?,
             Err(error) => observer.warning(&format!("the surface `{name}` is not written: {error}")),
         }
@@ -58,9 +58,9 @@ fn gmsh_file(mesh: &Mesh, unit: LengthUnit) -> Result<Vec<u8>, MeshError> {
     msh_bytes(mesh, unit.metres(), if large { MshEncoding::Binary } else { MshEncoding::Ascii })
 }
 
-/// Triangles of a mesh with their normals out of what is no air, whatever their order in a file, and between two bodies out of the one
-/// that is named first. Those of a conductor that its surface replaces, which is not in the mesh, keep their order.
-fn outwards(config: &Config, topology: &Topology, triangles: &[[NodeId; 3]]) -> Vec<[NodeId; 3]> {
+/// Triangles of a mesh with their normals out of what is no air, whatever their order in a file, and between two bodies out of that whose
+/// region comes first in the mesh. Those of a conductor that its surface replaces, which is not in the mesh, keep their order.
+fn oriented_outwards(config: &Config, topology: &Topology, triangles: &[[NodeId; 3]]) -> Vec<[NodeId; 3]> {
     let facets: HashMap<[NodeId; 3], &Facet> =
         topology.facets().iter().map(|facet| (face_key(facet.nodes), facet)).collect();
     let is_air: Vec<bool> = topology.region_names().iter().map(|name| is_air(config, name)).collect();

@@ -67,8 +67,8 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
 pub(super) fn wrong_sign(config: &Config, objective: &ObjectiveResult) -> Option<String> {
     let own = config.objective.as_ref()?;
     // A term that counts against the others makes the sum negative, whatever their directions.
-    let has_price = own.terms().iter().any(|term| term.weight < 0.0);
-    (own.goal == Goal::Maximise && !has_price && objective.initial < 0.0).then(|| {
+    let has_negative_weight = own.terms().iter().any(|term| term.weight < 0.0);
+    (own.goal == Goal::Maximise && !has_negative_weight && objective.initial < 0.0).then(|| {
         format!(
             "the objective is {:.4e} at the initial design, and to maximise it is to make it smaller in size first: for more of \
              it, reverse its direction or minimise it",

@@ -12,7 +12,7 @@ use fluxmorph_solver::coil::Racetrack;
 use super::Side;
 
 /// Where a field is made, bent or observed.
-pub(super) struct Place {
+pub(super) struct Site {
     /// The box around it.
     pub(super) bounds: AxisBox,
     form: Form,
@@ -29,7 +29,7 @@ enum Form {
     Winding(Vec<[Point; 2]>),
 }
 
-impl Place {
+impl Site {
     pub(super) fn of_probe(points: &[Point]) -> Self {
         Self { bounds: AxisBox::around(points), form: Form::Probe(points.to_vec()) }
     }
@@ -88,7 +88,7 @@ impl Place {
         }
     }
 
-    /// Its distance from a side [m]; beyond `far` a lower bound of it, which is at least `far`.
+    /// Its distance from a side [m], or `far` where that is no nearer.
     pub(super) fn distance(&self, mesh: &Mesh, side: &Side, far: f64) -> f64 {
         if self.bounds.square_gap(&side.bounds) > far * far {
             return far;
@@ -100,7 +100,7 @@ impl Place {
         };
         match &self.form {
             Form::Nodes(points) | Form::Probe(points) => least(points, far),
-            Form::Ball { center, radius } => (least(&[*center], far + radius) - radius).max(0.0),
+            Form::Ball { center, radius } => (least(&[*center], far + radius) - radius).clamp(0.0, far),
             Form::Winding(edges) => {
                 let crossings =
                     edges.iter().filter_map(|edge| crossing(*edge, side.normal?, side.patch.place));
