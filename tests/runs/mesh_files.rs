@@ -88,13 +88,13 @@ fn a_file_solves_as_the_generator_that_made_it() {
 fn surfaces_of_bodies_are_written_out_of_them() {
     let home = folder();
     let config = device(home.path());
-    edit(&config, "model = \"impedance\"", "model = \"volume\"");
-    let written = |mesh: &Mesh| {
+    let written = |mesh: &Mesh, model: &str| {
+        let model = format!("regions.plate.model={model}");
         let bytes = msh_bytes(mesh, 1e-3, MshEncoding::Ascii).expect("finite");
         fs::write(home.path().join("device.msh"), bytes).expect("written");
         let out = home.path().join("out");
-        let further =
-            ["--force", "--set", "analysis.elements=edge", "--set", "output.stl=[\"plate_bottom\"]"];
+        let stl = "output.stl=[\"plate_bottom\"]";
+        let further = ["--force", "--set", &model, "--set", "analysis.elements=edge", "--set", stl];
         finish(command(&[&"solve", &config, &"--out", &out]).args(further)).exits_with(0);
         fs::read(out.join("optimum_plate_bottom.stl")).expect("written")
     };
@@ -104,8 +104,9 @@ fn surfaces_of_bodies_are_written_out_of_them() {
         mesh.topology().surface("plate_bottom").expect("named").iter().enumerate().map(turn).collect();
     let topology = mesh.topology().as_ref().clone().with_surface("plate_bottom", bottom).expect("its faces");
     let turned = Mesh::new(Arc::new(topology), mesh.points().to_vec()).expect("the same elements");
-    let stl = written(&turned);
-    assert_eq!(stl, written(&mesh));
+    let stl = written(&turned, "volume");
+    assert_eq!(stl, written(&mesh, "volume"));
+    assert_eq!(stl, written(&turned, "impedance"));
     // Of each triangle the normal comes first, behind a head of 84 bytes.
     let component = |triangle: &[u8], d: usize| f32::from_le_bytes([0, 1, 2, 3].map(|i| triangle[4 * d + i]));
     assert!(stl[84..].chunks(50).all(|triangle| component(triangle, 2) < -0.99));

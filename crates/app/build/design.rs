@@ -139,11 +139,11 @@ pub(super) fn on_remaining(
     Err(source.error(vec![fault]).into())
 }
 
-/// A design triangle oriented out of the body; `None` where neither side is, or both are.
+/// A triangle of a surface oriented out of the body; `None` where neither side is, or both are.
 ///
 /// The body is the side with a `[regions]` entry; where that does not decide, the first region of a surface named
 /// `first|second`. Behind an outer face of air lies a body that is not meshed.
-fn out_of_body(
+pub(crate) fn out_of_body(
     config: &Config,
     topology: &Topology,
     name: &str,

@@ -35,7 +35,7 @@ pub(crate) mod steels;
 mod thin_windings;
 mod truncation;
 
-pub(crate) use design::triangulation as design_triangulation;
+pub(crate) use design::{out_of_body, triangulation as design_triangulation};
 pub(crate) use divided_mesh::DividedMesh;
 pub(crate) use elastic_body::{motion_in_words, stiffness_policy};
 pub(crate) use entries::{is_air, is_wound, material};

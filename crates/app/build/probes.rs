@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::locate::{holders, locate};
+use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, RegionId, millimetres};
 
 use super::entries::material;
@@ -44,16 +45,19 @@ pub(super) fn faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh
 pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
     let regions = mesh.topology().region_names();
     let name = |region: RegionId| regions[region.index()].as_str();
+    let points: Vec<Point> = config.probes.iter().flat_map(|probe| probe.points.iter().copied()).collect();
+    // The first region at a point is that of the first element, whose field is taken.
+    let mut around: Vec<Vec<RegionId>> = vec![Vec::new(); points.len()];
+    for (i, (e, _)) in holders(mesh, &points) {
+        around[i].push(mesh.topology().region_of()[e.index()]);
+    }
+    let mut around = around.iter();
     let mut warnings = Vec::new();
     for probe in &config.probes {
-        // The first region is that of the first element, whose field is taken.
-        let mut around: BTreeMap<usize, Vec<RegionId>> = BTreeMap::new();
-        for (j, (e, _)) in holders(mesh, &probe.points) {
-            around.entry(j).or_default().push(mesh.topology().region_of()[e.index()]);
-        }
         let mut between: BTreeMap<[&str; 2], Vec<usize>> = BTreeMap::new();
-        for (j, regions) in around {
-            let taken = name(regions[0]);
+        for (j, regions) in around.by_ref().take(probe.points.len()).enumerate() {
+            let Some(&first) = regions.first() else { continue };
+            let taken = name(first);
             if let Some(other) = regions.iter().find(|&&other| flux_density_jumps(config, taken, name(other)))
             {
                 between.entry([taken, name(*other)]).or_default().push(j);

@@ -17,7 +17,7 @@ use fluxmorph_solver::coil::CoilShape;
 use fluxmorph_solver::{Boundary, FieldModel, Material};
 use serde::Serialize;
 
-use self::site::Site;
+use self::site::{Form, Site};
 use super::soundness::faces_of;
 use super::{Setup, functionals};
 use crate::config::{Config, ObjectiveKind};
@@ -100,14 +100,19 @@ impl Side {
         Self { bounds: AxisBox::around(&corners), triangles, normal, standing: Standing::Wall, patch }
     }
 
+    /// Cosine between its normal and that of another one; `None` unless both are planes.
+    fn cosine(&self, other: &Self) -> Option<f64> {
+        Some(dot(self.normal?, other.normal?))
+    }
+
     /// Whether it is a plane that faces another one.
     fn is_opposite(&self, other: &Self) -> bool {
-        dot(self.patch.area_vector, other.patch.area_vector) < OPPOSITE * self.patch.area * other.patch.area
+        self.cosine(other).is_some_and(|cosine| cosine < OPPOSITE)
     }
 
     /// Whether it lies in the plane of another one.
     fn is_coplanar(&self, other: &Self, rounding: f64) -> bool {
-        self.normal.zip(other.normal).is_some_and(|(own, of)| dot(own, of) >= -OPPOSITE)
+        self.cosine(other).is_some_and(|cosine| cosine > -OPPOSITE)
             && self.beyond(other.patch.place).abs() <= rounding
     }
 
@@ -157,7 +162,7 @@ impl Truncation {
             return None;
         }
         let sources = sources(model, mesh);
-        if sources.iter().all(Site::is_empty) {
+        if sources.is_empty() {
             return None;
         }
         let [lower, upper] = mesh.bounding_box();
@@ -243,22 +248,15 @@ fn sides(
     let replaced = model.conductors().iter().flat_map(|conductor| &conductor.surface);
     let replaced: HashSet<_> = replaced.map(|triangle| face_key(*triangle)).collect();
     let is_matter: Vec<bool> = faces.iter().map(|face| replaced.contains(&face_key(face.nodes))).collect();
-    let mut sides: Vec<Side> = open_patches(hull, &is_matter).into_iter().map(of).collect();
+    let sides = open_patches(hull, &is_matter).into_iter().map(of);
     // A hole may part a plane of symmetry, of which then not all parts are reached.
-    let reached: Vec<bool> = sides
-        .iter()
-        .map(|side| {
-            sides
-                .iter()
-                .any(|other| other.standing >= Standing::Observed && side.is_coplanar(other, rounding))
-        })
-        .collect();
-    for (side, _) in
-        sides.iter_mut().zip(reached).filter(|(side, reached)| *reached && side.standing < Standing::Observed)
-    {
+    let (reached, mut others): (Vec<Side>, Vec<Side>) =
+        sides.partition(|side| side.standing >= Standing::Observed);
+    let is_of_reached = |side: &Side| reached.iter().any(|other| side.is_coplanar(other, rounding));
+    for side in others.iter_mut().filter(|side| is_of_reached(side)) {
         side.standing = Standing::Observed;
     }
-    sides
+    reached.into_iter().chain(others).collect()
 }
 
 /// What a side is called, by the surface that has most of it; of one without a name with a place.
@@ -310,13 +308,12 @@ fn size(whole: &AxisBox, places: &[&Site], planes: &[&Side]) -> f64 {
 }
 
 /// The box around all images of a point in a sector between two planes, which lie on a circle; around the point alone where they meet
-/// at right angles, or are one plane in two parts.
+/// at right angles.
 fn around_edge([first, second]: [&Side; 2], x: Point) -> AxisBox {
-    let none = AxisBox::around(&[x]);
-    let (Some(n), Some(m)) = (first.normal, second.normal) else { return none };
+    let (Some(n), Some(m)) = (first.normal, second.normal) else { return AxisBox::around(&[x]) };
     let cosine = dot(n, m);
-    if cosine.abs() <= RIGHT || cosine >= -OPPOSITE {
-        return none;
+    if cosine.abs() <= RIGHT {
+        return AxisBox::around(&[x]);
     }
     // The foot of the point on the edge has both distances zero.
     let [b, c] = [first, second].map(|side| side.beyond(x));
@@ -329,12 +326,18 @@ fn around_edge([first, second]: [&Side; 2], x: Point) -> AxisBox {
     AxisBox { lower: sub(foot, half), upper: add(foot, half) }
 }
 
-/// Planes that are reached and have the whole mesh on one side, but for those that face each other.
+/// Planes that are reached and have the whole mesh on one side, each once, but for those that face each other.
 fn planes_of_symmetry<'s>(mesh: &Mesh, sides: &'s [Side], rounding: f64) -> Vec<&'s Side> {
     let reached = || sides.iter().filter(|side| side.standing >= Standing::Observed && side.normal.is_some());
-    let is_lone = |side: &&Side| !reached().any(|other| side.is_opposite(other));
-    let is_outermost = |side: &&Side| mesh.points().iter().all(|&x| side.beyond(x) <= rounding);
-    reached().filter(is_lone).filter(is_outermost).collect()
+    let is_lone = |side: &Side| !reached().any(|other| side.is_opposite(other));
+    let is_outermost = |side: &Side| mesh.points().iter().all(|&x| side.beyond(x) <= rounding);
+    let mut planes: Vec<&Side> = Vec::new();
+    for side in reached().filter(|side| is_lone(side) && is_outermost(side)) {
+        if !planes.iter().any(|other| side.is_coplanar(other, rounding)) {
+            planes.push(side);
+        }
+    }
+    planes
 }
 
 /// Whether coils and matter reach from one side of the mesh to the one that faces it.
@@ -353,9 +356,10 @@ fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Site> {
     };
     let own = functionals(config).into_iter().filter(|(_, own)| is_of_places(own.kind));
     let regions = own.filter_map(|(_, own)| topology.region(own.region.as_ref()?).ok());
-    let of_regions = regions.map(|region| Site::of_nodes(mesh, topology.elements_of(region), []));
-    let of_probes = config.probes.iter().map(|probe| Site::of_probe(&probe.points));
-    let of_expansions = config.multipoles.iter().map(|set| Site::of_ball(set.center, set.radius));
+    let of_regions = regions.map(|region| Site::of_nodes(mesh, nodes_of(mesh, topology.elements_of(region))));
+    let of_probes = config.probes.iter().map(|probe| Site::new(Form::Probe(probe.points.clone())));
+    let of_expansions =
+        config.multipoles.iter().map(|set| Site::new(Form::Ball { center: set.center, radius: set.radius }));
     let fills_mesh = |place: &Site| {
         let AxisBox { lower, upper } = place.bounds;
         (0..3).all(|d| lower[d] <= whole.lower[d] && upper[d] >= whole.upper[d])
@@ -369,16 +373,20 @@ fn sources(model: &FieldModel, mesh: &Mesh) -> Vec<Site> {
     for e in wound_or_matter(model) {
         by_region.entry(model.topology().region_of()[e.index()].index()).or_default().push(e);
     }
-    let meshed = by_region.into_values().map(|elements| Site::of_nodes(mesh, elements, []));
-    let replaced = model
-        .conductors()
-        .iter()
-        .map(|conductor| Site::of_nodes(mesh, [], conductor.surface.iter().flatten().copied()));
+    let meshed = by_region.into_values().map(|elements| Site::of_nodes(mesh, nodes_of(mesh, elements)));
+    let surfaces = model.conductors().iter().map(|conductor| &conductor.surface);
+    let replaced = surfaces.filter(|surface| !surface.is_empty());
+    let replaced = replaced.map(|surface| Site::of_nodes(mesh, surface.as_flattened().iter().copied()));
     let analytic = model.coils().iter().filter_map(|coil| match &coil.shape {
-        CoilShape::Racetrack(coil) => Some(Site::of_winding(coil)),
+        CoilShape::Racetrack(coil) => Some(Site::new(Form::Winding(coil.edges()))),
         CoilShape::Region(_) | CoilShape::Solid(_) => None,
     });
     analytic.chain(meshed).chain(replaced).collect()
+}
+
+/// The nodes of elements, of each its four.
+fn nodes_of(mesh: &Mesh, elements: Vec<ElementId>) -> impl Iterator<Item = NodeId> {
+    elements.into_iter().flat_map(|e| mesh.topology().tets()[e.index()])
 }
 
 /// Elements of windings and conductors, or that are not air.

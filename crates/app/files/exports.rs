@@ -10,7 +10,7 @@ use fluxmorph_geometry::io::{MshEncoding, msh_bytes, stl_bytes};
 use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 
-use crate::build::{is_air, mesh};
+use crate::build::{mesh, out_of_body};
 use crate::config::{Config, LengthUnit};
 use crate::error::Error;
 use crate::files::{RunDirectory, surface_files};
@@ -37,14 +37,14 @@ pub(crate) fn write(
         }
     }
     for (name, file) in config.output.stl.iter().zip(surface_files(&config.output.stl)) {
-        let triangles = mesh.topology().surface(name).unwrap_or_default();
+        let triangles = oriented_outwards(config, mesh.topology(), name);
         if triangles.is_empty() {
             observer.warning(&format!(
                 "the surface `{name}` is not written: nothing of it is left in the mesh that was solved on"
             ));
             continue;
         }
-        match stl_bytes(mesh, &oriented_outwards(config, mesh.topology(), triangles), unit.metres()) {
+        match stl_bytes(mesh, &triangles, unit.metres()) {
             Ok(bytes) => directory.write(&directory.surface(&file), &bytes)?,
             Err(error) => observer.warning(&format!("the surface `{name}` is not written: {error}")),
         }
@@ -58,24 +58,21 @@ fn gmsh_file(mesh: &Mesh, unit: LengthUnit) -> Result<Vec<u8>, MeshError> {
     msh_bytes(mesh, unit.metres(), if large { MshEncoding::Binary } else { MshEncoding::Ascii })
 }
 
-/// Triangles of a mesh with their normals out of what is no air, whatever their order in a file, and between two bodies out of that whose
-/// region comes first in the mesh. Those of a conductor that its surface replaces, which is not in the mesh, keep their order.
-fn oriented_outwards(config: &Config, topology: &Topology, triangles: &[[NodeId; 3]]) -> Vec<[NodeId; 3]> {
+/// A surface with its normals out of the body, whatever the order of its triangles in a file; between two bodies, or none, out of the
+/// region that comes first.
+fn oriented_outwards(config: &Config, topology: &Topology, name: &str) -> Vec<[NodeId; 3]> {
     let facets: HashMap<[NodeId; 3], &Facet> =
         topology.facets().iter().map(|facet| (face_key(facet.nodes), facet)).collect();
-    let is_air: Vec<bool> = topology.region_names().iter().map(|name| is_air(config, name)).collect();
-    let rank = |e: ElementId| {
-        let region = topology.region_of()[e.index()].index();
-        (is_air[region], region)
+    let region = |e: ElementId| topology.region_of()[e.index()];
+    let oriented = |triangle: &[NodeId; 3]| {
+        let facet = facets.get(&face_key(*triangle)).copied();
+        let of_first = |facet: &Facet| match facet {
+            Facet { nodes: [a, b, c], inside, outside: Some(e) } if region(*e) < region(*inside) => {
+                [*a, *c, *b]
+            }
+            facet => facet.nodes,
+        };
+        out_of_body(config, topology, name, facet).or(facet.map(of_first)).unwrap_or(*triangle)
     };
-    let turned = |triangle: &[NodeId; 3]| match facets.get(&face_key(*triangle)) {
-        Some(Facet { nodes: [a, b, c], inside, outside: Some(outside) })
-            if rank(*outside) < rank(*inside) =>
-        {
-            [*a, *c, *b]
-        }
-        Some(facet) if facet.outside.is_some() || !rank(facet.inside).0 => facet.nodes,
-        _ => *triangle,
-    };
-    triangles.iter().map(turned).collect()
+    topology.surface(name).unwrap_or_default().iter().map(oriented).collect()
 }

@@ -23,6 +23,8 @@ mod synced;
 
 use std::path::{Path, PathBuf};
 
+use nix::errno::Errno;
+
 pub use accuracy::{
     Accuracy, CrossCheck, CurvedFacets, LEAST_LEFT_OUT, Level, SAFETY, Verdict, WHERE_LEFT_OUT, relative_bar,
 };
@@ -132,9 +134,6 @@ pub enum OutputError {
 /// The path of what has none.
 pub(crate) const STDOUT: &str = "standard output";
 
-/// `EMFILE` of Linux and macOS, which has no [`std::io::ErrorKind`].
-const TOO_MANY_OPEN: i32 = 24;
-
 /// What to do about an error of the operating system.
 fn advice(action: &str, path: &Path, error: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
@@ -154,7 +153,7 @@ fn advice(action: &str, path: &Path, error: &std::io::Error) -> &'static str {
         ErrorKind::NotFound => "check that the path exists",
         ErrorKind::InvalidFilename => "take a shorter name",
         ErrorKind::FileTooLarge => "the file system, or `ulimit -f`, allows no file of this size",
-        _ if error.raw_os_error() == Some(TOO_MANY_OPEN) => {
+        _ if error.raw_os_error() == Some(Errno::EMFILE as i32) => {
             "too many files are open: raise `ulimit -n`, or run fewer programs"
         }
         _ => "check the path and the disk",

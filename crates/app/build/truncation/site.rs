@@ -6,8 +6,7 @@ use std::collections::BTreeSet;
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::depth::depths;
 use fluxmorph_geometry::tet4::{Point, dot, sub};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
-use fluxmorph_solver::coil::Racetrack;
+use fluxmorph_geometry::{Mesh, NodeId};
 
 use super::Side;
 
@@ -18,8 +17,9 @@ pub(super) struct Site {
     form: Form,
 }
 
-enum Form {
-    /// Nodes of elements [m].
+/// What it consists of.
+pub(super) enum Form {
+    /// Nodes of the mesh [m].
     Nodes(Vec<Point>),
     /// The points of a probe [m].
     Probe(Vec<Point>),
@@ -30,50 +30,19 @@ enum Form {
 }
 
 impl Site {
-    pub(super) fn of_probe(points: &[Point]) -> Self {
-        Self { bounds: AxisBox::around(points), form: Form::Probe(points.to_vec()) }
+    pub(super) fn new(form: Form) -> Self {
+        Self { bounds: AxisBox::around(&form.extremes()), form }
     }
 
-    /// The nodes of elements, and others.
-    pub(super) fn of_nodes(
-        mesh: &Mesh,
-        elements: impl IntoIterator<Item = ElementId>,
-        others: impl IntoIterator<Item = NodeId>,
-    ) -> Self {
-        let of_elements = elements.into_iter().flat_map(|e| mesh.topology().tets()[e.index()]);
-        let nodes: BTreeSet<NodeId> = of_elements.chain(others).collect();
-        let points: Vec<Point> = nodes.into_iter().map(|n| mesh.point(n)).collect();
-        Self { bounds: AxisBox::around(&points), form: Form::Nodes(points) }
-    }
-
-    pub(super) fn of_ball(center: Point, radius: f64) -> Self {
-        Self { bounds: AxisBox::around(&[center]).grown(radius), form: Form::Ball { center, radius } }
-    }
-
-    pub(super) fn of_winding(coil: &Racetrack) -> Self {
-        let [lower, upper] = coil.bounding_box();
-        Self { bounds: AxisBox { lower, upper }, form: Form::Winding(coil.edges()) }
-    }
-
-    /// Whether nothing is there.
-    pub(super) fn is_empty(&self) -> bool {
-        matches!(&self.form, Form::Nodes(points) if points.is_empty())
+    /// Nodes of a mesh, each once or more often.
+    pub(super) fn of_nodes(mesh: &Mesh, nodes: impl IntoIterator<Item = NodeId>) -> Self {
+        let nodes: BTreeSet<NodeId> = nodes.into_iter().collect();
+        Self::new(Form::Nodes(nodes.into_iter().map(|n| mesh.point(n)).collect()))
     }
 
     /// Points between which it lies [m].
     pub(super) fn extremes(&self) -> Vec<Point> {
-        match &self.form {
-            Form::Nodes(points) | Form::Probe(points) => points.clone(),
-            Form::Winding(edges) => edges.as_flattened().to_vec(),
-            Form::Ball { center, radius } => {
-                let along = |k: usize, step: f64| {
-                    let mut x = *center;
-                    x[k] += step;
-                    x
-                };
-                (0..3).flat_map(|k| [along(k, -radius), along(k, *radius)]).collect()
-            }
-        }
+        self.form.extremes()
     }
 
     /// Whether it reaches a side, to the rounding of coordinates [m]; all points of a probe must lie on that, for a scan may end at
@@ -105,6 +74,23 @@ impl Site {
                 let crossings =
                     edges.iter().filter_map(|edge| crossing(*edge, side.normal?, side.patch.place));
                 least(&edges.as_flattened().iter().copied().chain(crossings).collect::<Vec<_>>(), far)
+            }
+        }
+    }
+}
+
+impl Form {
+    fn extremes(&self) -> Vec<Point> {
+        match self {
+            Self::Nodes(points) | Self::Probe(points) => points.clone(),
+            Self::Winding(edges) => edges.as_flattened().to_vec(),
+            Self::Ball { center, radius } => {
+                let along = |k: usize, step: f64| {
+                    let mut x = *center;
+                    x[k] += step;
+                    x
+                };
+                (0..3).flat_map(|k| [along(k, -radius), along(k, *radius)]).collect()
             }
         }
     }

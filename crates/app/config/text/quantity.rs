@@ -11,18 +11,8 @@ use super::message::shown;
 use super::nearest::nearest;
 
 /// Spellings of resistivity: common in material tables, and the reciprocal of what is needed.
-const RESISTIVITY: &[&str] = &[
-    "Ohm m",
-    "ohm m",
-    "Ohm*m",
-    "ohm*m",
-    "Ohm.m",
-    "Ohm-m",
-    "\u{3a9} m",
-    "\u{3a9}m",
-    "\u{3a9}\u{b7}m",
-    "\u{2126}m",
-];
+const RESISTIVITY: &[&str] =
+    &["Ohm m", "ohm m", "Ohm*m", "ohm*m", "Ohm.m", "Ohm-m", "\u{3a9} m", "\u{3a9}m", "\u{3a9}\u{b7}m"];
 
 /// Why a text is not a quantity of the wanted dimension.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,6 +38,9 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
     let trimmed = text.trim();
     let written = shown(text);
     let (number, unit_text) = split_number(trimmed);
+    // Greek mu stands for the sign of micro, and the sign of ohm for Greek omega.
+    let unit_text = unit_text.replace('\u{3bc}', "\u{b5}").replace('\u{2126}', "\u{3a9}");
+    let unit_text = unit_text.as_str();
     let accepted = || {
         format!("write it like \"{}\"; accepted units: {}", dimension.example(), dimension.accepted_units())
     };
@@ -76,9 +69,6 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             help,
         });
     }
-    // The Greek letters that look like the signs of micro and ohm are meant as these.
-    let unit_text = unit_text.replace('\u{3bc}', "\u{b5}").replace('\u{2126}', "\u{3a9}");
-    let unit_text = unit_text.as_str();
     let Some(unit) = UNITS.iter().find(|unit| unit.name == unit_text) else {
         let known: Vec<_> = dimension.units().collect();
         let hint = match meant(unit_text, &known) {
