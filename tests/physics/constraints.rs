@@ -158,7 +158,7 @@ fn what_is_beyond_a_bound_by_little_is_taken_a_step_back() {
 }
 
 /// Five of six variables at their bounds, and the mass for the last: the multipliers of least norm promise a gain there, and four
-/// evaluations more were spent on rounding.
+/// evaluations more were spent on rounding. One may go to what the method's own problem leaves of the constraint, 1e-8 of it.
 #[test]
 fn a_search_ends_where_bounds_and_a_constraint_hold_the_design() {
     let of_six = [("grid = [7, 13]", "grid = [3, 2]"), ("\"2.5 kg\"", "\"3 kg\"")];
@@ -175,7 +175,7 @@ fn a_search_ends_where_bounds_and_a_constraint_hold_the_design() {
     assert_eq!(held, 5, "{:?}", run.best.values);
     let reached =
         rows.iter().position(|row| row.objective < run.best.objective * (1.0 + 1e-6)).expect("the best");
-    assert!(run.stop_reason == StopReason::ObjectiveConverged && rows.len() - reached <= 2, "{reached}");
+    assert!(run.stop_reason == StopReason::ObjectiveConverged && rows.len() - reached <= 3, "{reached}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::support::device::{HYPERELASTIC, LINEAR, THROUGH_THE_GAP, shipped, written};
 use crate::support::folder::{RunFolder, count, number};
-use crate::support::program::{finish, folder};
+use crate::support::program::{command, finish, folder};
 
 /// By every law, of a face that the mesh does not carry to its bound.
 #[test]
@@ -86,4 +86,48 @@ fn a_face_that_reaches_an_observed_place_is_cut_short() {
     assert!(number(&result, "/objective/ratio") > 1.0, "it goes on nearer");
     let covered = device.with("design.initial=\"4 mm\"");
     finish(&mut covered.command("solve", &home.path().join("solved"))).with(3, reached);
+}
+
+/// Half of a block of iron that grows into the gap above it.
+const HALVED: &str = r#"
+[mesh]
+generator = "boxes"
+boxes.box = [["0 mm", "0 mm", "0 mm"], ["40 mm", "40 mm", "40 mm"]]
+boxes.regions = [
+    { name = "gap", box = [["0 mm", "0 mm", "5 mm"], ["30 mm", "30 mm", "20 mm"]], size = ["5 mm", "5 mm", "5 mm"] },
+    { name = "block", box = [["0 mm", "0 mm", "0 mm"], ["20 mm", "20 mm", "5 mm"]], size = ["5 mm", "5 mm", "2.5 mm"] },
+]
+[materials.iron]
+relative_permeability = 100
+[regions.block]
+material = "iron"
+[analysis]
+frequency = 0
+[boundaries]
+flux_parallel = ["x_min", "y_min"]
+flux_normal = ["z_min"]
+uniform_field = { surfaces = ["x_max", "y_max", "z_max"], b = ["0 T", "0 T", "1 mT"] }
+[objective]
+kind = "energy"
+region = "block"
+[[constraints]]
+kind = "thickness"
+minimum = "4 mm"
+[design]
+surface = "block|gap"
+direction = [0, 0, 1]
+lower = "-1 mm"
+upper = "1 mm"
+[remesh]
+region = ["gap"]
+"#;
+
+#[test]
+fn the_thickness_of_a_body_that_a_plane_halves_is_said_to_be_that_of_the_half() {
+    let home = folder();
+    let path = home.path().join("halved.toml");
+    std::fs::write(&path, HALVED).expect("a configuration");
+    let checked = finish(&mut command(&[&"check", &path])).exits_with(0);
+    let said = "design nodes the body ends at the outside of the mesh, as at `z_min`, and its thickness is that of the meshed part";
+    assert!(checked.stderr.contains(said), "{}", checked.stderr);
 }

@@ -11,6 +11,7 @@ mod deviation;
 mod examples;
 mod field_pieces;
 mod folders;
+mod forces;
 mod fresh_mesh;
 mod memory;
 mod mesh_files;

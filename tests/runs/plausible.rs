@@ -172,37 +172,23 @@ fn sides_without_condition_are_listed_with_their_areas() {
 }
 
 #[test]
-fn a_force_on_air_and_one_on_a_part_of_the_iron_are_asked_about() {
-    let of = |region: &str| {
-        let forces = format!("forces=[{{name=\"body\",regions=[\"{region}\"]}}]");
-        // A winding that leaves a layer of air around the tip.
-        let wide = ["coils[0].half_window=[\"95 mm\",\"95 mm\"]", "coils[0].width=\"20 mm\"", &forces];
-        let mut checked = command(&[&"check", &repository("configs/pole.toml"), &"--json"]);
-        texts(&finish(checked.args(set(&wide))).exits_with(0).json()["warnings"])
+fn a_quality_factor_without_the_loss_of_its_wire_is_asked_about() {
+    let of = |kind: &str, more: &[&str]| {
+        let (kind, config) = (format!("objective.kind=\"{kind}\""), repository("configs/coupled_coils.toml"));
+        let mut checked = command(&[&"check", &config, &"--json", &"--set", &kind]);
+        let coarse = set(&["mesh.boxes.refinement=0.5"]);
+        texts(&finish(checked.args(coarse).args(set(more))).exits_with(0).json()["warnings"])
     };
-    let air = of("observation");
-    assert!(air.contains("no force acts on the body `body`: nothing in `observation`"), "{air}");
-    // The air around it holds the winding, whose force it is.
-    assert!(!of("air").contains("no force acts"));
-    let part = of("tip");
-    assert!(part.contains("`body` is joined to the iron of `iron`"), "{part}");
-    let alone = finish(&mut command(&[&"check", &repository("configs/actuator.toml"), &"--json"]));
-    assert_eq!(texts(&alone.exits_with(0).json()["warnings"]), "");
-}
-
-#[test]
-fn a_force_across_a_plane_that_cuts_its_body_is_asked_about() {
-    let along = |direction: &str| {
-        let direction = format!("objective.direction={direction}");
-        let mut checked = command(&[&"check", &repository("configs/actuator.toml"), &"--json"]);
-        texts(&finish(checked.args(set(&[&direction]))).exits_with(0).json()["warnings"])
-    };
+    let said = "has no resistance, so that the";
+    assert!(!of("link_efficiency", &[]).contains(said));
+    let one = of("link_efficiency", &["coils[1].resistance=\"0 ohm\""]);
     assert!(
-        along("[1, 0, 0]").contains("the surface `x_min` cuts the body `armature`"),
-        "{}",
-        along("[1, 0, 0]")
+        one.contains(&format!("`receiver` {said} link efficiency")) && !one.contains("`pad` has no"),
+        "{one}"
     );
-    assert!(!along("[0, 0, -1]").contains("cuts the body"));
+    let factor = ["objective.coils=[\"pad\"]", "coils[0].resistance=\"0 ohm\""];
+    let factor = of("quality_factor", &factor);
+    assert!(factor.contains(&format!("`pad` {said} quality factor")), "{factor}");
 }
 
 #[test]
@@ -215,25 +201,6 @@ fn a_device_in_open_space_needs_no_condition() {
 }
 
 /// The shell stands for all of space: the stress in it is not that of its elements.
-#[test]
-fn a_force_is_not_taken_in_the_shell_of_open_space() {
-    let home = folder();
-    let path = home.path().join("magnet.toml");
-    std::fs::write(&path, format!("{MAGNET}\n[[forces]]\nname = \"magnet\"\nregions = [\"magnet\"]\n"))
-        .expect("written");
-    let with = |sets: &[&str]| finish(command(&[&"check", &path]).args(set(sets)));
-    with(&[]).exits_with(0);
-    let flush = "mesh.boxes.box=[[\"-10 mm\", \"-30 mm\", \"-30 mm\"], [\"30 mm\", \"30 mm\", \"30 mm\"]]";
-    let touching = with(&[flush]).exits_with(3);
-    assert!(
-        touching.stderr.contains("the body touches or holds the shell of open space"),
-        "{}",
-        touching.stderr
-    );
-    let shell = with(&["forces[0].regions=[\"magnet\", \"open\"]"]).exits_with(3);
-    assert!(shell.stderr.contains("the body touches or holds the shell of open space"), "{}", shell.stderr);
-}
-
 /// Rings in cells of their width, of twice and of ten times that have 10, 17 and 37 % too little.
 #[test]
 fn a_winding_thinner_than_its_elements_is_said_to_have_too_little_inductance() {
@@ -308,7 +275,7 @@ fn a_winding_that_branches_is_no_noise() {
 }
 
 /// A cube of 20 mm in a box, whole.
-const MAGNET: &str = r#"
+pub(super) const MAGNET: &str = r#"
 [mesh]
 generator = "boxes"
 

@@ -1,4 +1,4 @@
-//! Bodies whose force or torque means little: of air, of iron that goes on outside of them, and cut by an outer face.
+//! Bodies whose force or torque means little: of air, that touch iron outside of them, and cut by an outer face.
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
@@ -23,7 +23,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Ve
     bodies.chain(cut).chain(cut_warnings(config, mesh)).collect()
 }
 
-/// What to say of a body whose force means little: one of air, and one of iron that goes on outside of it.
+/// What to say of a body whose force means little: one of air, and one that touches iron outside of it.
 fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &ForceBody) -> Option<String> {
     let topology = mesh.topology();
     let is_iron = |name: &str| material(config, name).relative_permeability != 1.0;
@@ -41,14 +41,14 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
              that on what lies beside it"
         ));
     }
-    let region = |name: &&String| topology.region(name).ok().filter(|_| is_iron(name));
-    let own: Vec<RegionId> = body.regions.iter().filter_map(|name| region(&name)).collect();
+    let own: Vec<RegionId> = body.regions.iter().filter_map(|name| topology.region(name).ok()).collect();
     let touches = |other: RegionId| own.iter().any(|&own| !topology.interface(own, other).is_empty());
     let mut outside = topology.region_names().iter().filter(|name| !body.regions.contains(name));
-    let joined = outside.find(|name| region(name).is_some_and(touches))?;
+    let joined = outside.find(|name| is_iron(name.as_str()) && topology.region(name).is_ok_and(touches))?;
     Some(format!(
-        "the body `{name}` is joined to the iron of `{joined}`: where iron meets iron the force on one side depends on the mesh; \
-         take `{joined}` into its regions, or leave air between the two"
+        "the body `{name}` is joined to the iron of `{joined}`: the force on it is taken in the elements around it, which where they \
+         are iron do not hold the field at its face, and depends on the mesh; take `{joined}` into its regions, or leave air between \
+         the two"
     ))
 }
 

@@ -2,7 +2,7 @@
 
 mod faults;
 
-pub(super) use faults::faults;
+pub(super) use faults::{faults, warnings};
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -153,7 +153,7 @@ fn measured(
         ObjectiveKind::Power => at_terminals(AtTerminals::Power),
         ObjectiveKind::PowerFactor => at_terminals(AtTerminals::PowerFactor),
         ObjectiveKind::Volume | ObjectiveKind::Mass => {
-            Ok(Functional::Volume(body(config, (functional.kind, name), meshes, model)?))
+            Ok(Functional::Volume(body(config, (functional.kind, name), meshes)?))
         }
     }
 }
@@ -163,11 +163,8 @@ fn body(
     config: &Config,
     (kind, region): (ObjectiveKind, &str),
     [full_mesh, mesh]: [&Mesh; 2],
-    model: &FieldModel,
 ) -> Result<Volume, Error> {
-    let conductor = model.conductors().iter().find(|own| own.name == region);
-    let surface: Option<&[[NodeId; 3]]> = conductor.map(|own| own.surface.as_slice());
-    let volume = Volume::new(mesh, full_mesh, region, surface)?;
+    let volume = Volume::new(mesh, full_mesh, region)?;
     Ok(match density(config, region) {
         Some(density) if kind == ObjectiveKind::Mass => volume.with_density(density),
         _ => volume,

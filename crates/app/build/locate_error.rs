@@ -185,9 +185,7 @@ impl Blame<'_> {
                 let is_region = self.config.open.as_ref().is_some_and(|open| open.region.is_some());
                 self.at(if is_region { "open.region" } else { "open.surfaces" }, error)
             }
-            SolverError::EmptyRegion { region, .. } | SolverError::Boxed { region } => {
-                self.region(region, error)
-            }
+            SolverError::EmptyRegion { region, .. } => self.region(region, error),
             SolverError::CurveOnRanks { region } => {
                 let name = &self.config.regions.get(region)?.material;
                 let material = self.config.materials.get(name)?;

@@ -32,6 +32,7 @@ mod share;
 mod skin;
 mod soundness;
 pub(crate) mod steels;
+mod thickness;
 mod thin_windings;
 mod truncation;
 
@@ -136,6 +137,7 @@ pub fn set_up_watched(
     }
     let at_bounds = skin::bound_warnings(config, &setup.audits, (&setup.problem, &setup.full_mesh));
     setup.warnings.extend(at_bounds);
+    setup.warnings.extend(thickness::cut_warning(config, &setup.problem));
     Ok(setup)
 }
 
@@ -186,6 +188,7 @@ fn problem_on(
         warnings.extend(plausible::warnings(config, &full_mesh, coils, &open_patches));
         warnings.extend(applied::on_conductors(config, &full_mesh));
         warnings.extend(probes::warnings(config, &mesh));
+        warnings.extend(functional::warnings(config));
         warnings.extend(elements::warnings(config, &full_mesh, &audits));
     }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());

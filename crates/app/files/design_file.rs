@@ -73,6 +73,8 @@ pub struct DesignFile {
     pub values: Vec<f64>,
     /// Where the variables act [m]; `None` where the file does not say.
     points: Option<Vec<[f64; 3]>>,
+    /// How often the run that the file is of refined its mesh.
+    refinements: u64,
     /// The folder of the run whose configuration is analysed, and the B–H tables that it has read; `None` without one.
     run: Option<(PathBuf, Vec<FileHash>)>,
 }
@@ -82,6 +84,11 @@ impl DesignFile {
     #[must_use]
     pub fn of_run(self, run: Option<(PathBuf, Vec<FileHash>)>) -> Self {
         Self { run, ..self }
+    }
+
+    /// How often its run refined the mesh, where the configuration of that run is analysed.
+    pub fn refinements_of_run(&self) -> Option<u64> {
+        self.run.as_ref().map(|_| self.refinements).filter(|count| *count > 0)
     }
 
     /// Whether tables with these hashes of their content are those that the run has read; others have other names.
@@ -173,7 +180,8 @@ pub fn read_design(path: &Path, expected: usize) -> Result<DesignFile, DesignFil
             Some(points).filter(|points| points.len() == expected)
         }
     };
-    Ok(DesignFile { path: path.to_owned(), values, points, run: None })
+    let refinements = value.pointer("/accuracy/refinements").and_then(Value::as_u64).unwrap_or(0);
+    Ok(DesignFile { path: path.to_owned(), values, points, refinements, run: None })
 }
 
 #[cfg(test)]

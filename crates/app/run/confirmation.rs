@@ -294,8 +294,12 @@ impl Session<'_> {
     /// The best shape, where a control grid gives it between the nodes too and the check kept its facets: a mesh that is generated anew
     /// has other ones.
     fn cut_shape<'a>(&self, objective: &ObjectiveResult, meshes: &'a ShapeMeshes) -> Option<&'a Mesh> {
-        let has_grid = self.config.design.as_ref().is_some_and(|design| design.grid.is_some());
-        (has_grid && objective.is_verified_on_cut_elements()).then_some(&meshes.solved[1])
+        (self.has_grid() && objective.is_verified_on_cut_elements()).then_some(&meshes.solved[1])
+    }
+
+    /// Whether a control grid gives the shape, between the nodes too.
+    pub(super) fn has_grid(&self) -> bool {
+        self.config.design.as_ref().is_some_and(|design| design.grid.is_some())
     }
 
     /// What no estimate has of a near wall, which is reported.

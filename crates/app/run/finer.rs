@@ -14,7 +14,7 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, S
 use fluxmorph_remesh::{Moved, StepToInversion};
 
 use crate::build::{Mode, Setup, memory_limit, remaining_nodes, set_up_on, with_cells_written_down};
-use crate::config::{Config, Functional, SourceMap};
+use crate::config::{Config, Constraint, SourceMap};
 use crate::error::Error;
 
 /// A mesh that was cut, with the configuration of the field alone.
@@ -176,9 +176,13 @@ pub(super) fn both<S>(
 /// A configuration without what moves, and without constraints on that.
 fn field_alone(config: &Config) -> Config {
     let mut alone = Config { design: None, remesh: None, morph: None, ..config.clone() };
-    let is_of_field = |own: &Functional| own.kind.is_of_field();
-    alone.constraints.retain(|constraint| constraint.limit.functional().is_some_and(is_of_field));
+    alone.constraints.retain(is_of_field);
     alone
+}
+
+/// Whether a constraint is on the field, and not on the shape alone.
+pub(super) fn is_of_field(constraint: &Constraint) -> bool {
+    constraint.limit.functional().is_some_and(|own| own.kind.is_of_field())
 }
 
 /// Relative residual of a field whose objective is looked at once: its digits are far below the errors that a check is about, and

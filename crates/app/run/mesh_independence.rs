@@ -195,6 +195,10 @@ impl MeshIndependence<'_> {
     ) -> Result<Outcome, Error> {
         match self.compute_on(fresh, interrupted) {
             Err(Error::Optimizer(error)) if error.is_unreached() && self.meshes.is_some() => {
+                observer.notice(
+                    "a fresh mesh cannot be moved to the best shape without inverting elements: both shapes are checked on their \
+                     own elements, cut, instead",
+                );
                 self.compute_on_finer_elements(interrupted)
             }
             Ok(Outcome::TooDear(times)) => {

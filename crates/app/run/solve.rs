@@ -7,7 +7,7 @@ use fluxmorph_remesh::Moved;
 use super::estimate::Estimate;
 use super::excess::LeftOut;
 use super::facets::{Found, Shape};
-use super::finer::{Cut, FinerProblem};
+use super::finer::{Cut, FinerProblem, is_of_field};
 use super::prepared::Prepared;
 use super::recorder::{write_collection, write_field};
 use super::reported;
@@ -35,6 +35,12 @@ pub fn solve(
     }
     if let Some(design) = &design {
         design.check_tables(&prepared.setup.tables)?;
+        if let Some(count) = design.refinements_of_run().filter(|_| halvings == 0) {
+            observer.notice(&format!(
+                "the run of this design refined its mesh {count} times, and its numbers are of that mesh; analysed is the mesh that it \
+                 began with, whose errors are larger: --refine 1 halves its edges"
+            ));
+        }
     }
     let values = design_values(problem, design.map(|design| design.values), observer);
     // A design that breaks the mesh is refused before an earlier run is replaced.
@@ -53,6 +59,14 @@ pub fn solve(
             observer.warning(
                 "a refined mesh is solved on by the first rank alone: it must fit into the memory of one, and the others wait",
             );
+        }
+        let of_shape = config.constraints.iter().filter(|own| !is_of_field(own));
+        let left_out: Vec<String> = of_shape.map(|own| format!("`{}`", own.name)).collect();
+        if !left_out.is_empty() {
+            observer.notice(&format!(
+                "constraints on the shape are not looked at on a refined mesh: {}; they are the same on the mesh as it is",
+                left_out.join(", ")
+            ));
         }
         let cut = Cut::Halvings(halvings);
         let finer = FinerProblem::new(config, source, &prepared.setup.full_mesh, cut)?;
@@ -177,7 +191,9 @@ impl Session<'_> {
                 .then_some((analysis, of_states)),
         };
         let shapes = if shape.objective.is_some() || shape.analysis.is_some() { &[shape][..] } else { &[] };
-        let (facets, of_states) = match self.facets_of(None, shapes, observer) {
+        // What halves edges keeps the facets of the mesh that was halved.
+        let shape_of_design = Some(&analysis.mesh).filter(|_| self.has_grid() && halvings == 0);
+        let (facets, of_states) = match self.facets_of(shape_of_design, shapes, observer) {
             Some(Found { facets, of_states }) => (Some(facets), of_states),
             None => (None, Vec::new()),
         };

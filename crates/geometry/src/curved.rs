@@ -2,8 +2,9 @@
 //!
 //! A surface is taken from its facets alone: with its normals `n` at the ends of an edge `e`, its middle lies `s = (n_b − n_a)·e/8`
 //! over the edge, exactly so of a circle (`L²/(8R)`). Over a triangle with its nodes on the surface this is a quadratic function,
-//! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around; where these are on one side
-//! only, as at a plane of symmetry, it goes on as from the faces behind to them.
+//! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around, and of their images in the
+//! outer faces of the mesh that end them, so that a part of a device has the surfaces of the whole; where there are faces on one
+//! side only, it goes on as from the faces behind to them.
 //!
 //! Facets go on in each other where they meet at less than 42°, whatever the regions behind them, and where one of them has
 //! turns at all of its nodes: an edge between two planes with nodes of their own is an edge.
@@ -14,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ids::{NodeId, RegionId};
 use crate::tet4::{Point, add, area_vector, centroid, cross, dot, norm, sub};
-use crate::topology::{Facet, Topology};
+use crate::topology::{Facet, Topology, edge_key};
 
 /// Cosine of the largest angle, 42°, at which two facets are taken for one curved surface: a ball with nine of them along a circle,
 /// and no chamfer of 45°.
@@ -51,6 +52,8 @@ struct Face {
     area: Point,
     /// The face that it goes on in, behind the edge from each node to the next one.
     next: [Option<usize>; 3],
+    /// The normal of the outer face behind that edge where it goes on in its image there.
+    mirror: [Option<Point>; 3],
 }
 
 /// A face of a surface, with the direction of another face of it: 1, or −1 where it is the other one.
@@ -83,7 +86,7 @@ impl<'a> CurvedSurfaces<'a> {
                 between => between,
             };
             let is_face = Some(between.0) != between.1 && counts(between.0, between.1) && norm(area) > 0.0;
-            is_face.then_some(Face { nodes, between, area, next: [None; 3] })
+            is_face.then_some(Face { nodes, between, area, next: [None; 3], mirror: [None; 3] })
         };
         let faces: Vec<Face> = topology.facets().iter().filter_map(of).collect();
         let mut around: BTreeMap<NodeId, Vec<usize>> = BTreeMap::new();
@@ -91,12 +94,13 @@ impl<'a> CurvedSurfaces<'a> {
             face.nodes.iter().for_each(|&n| around.entry(n).or_default().push(i));
         }
         let mut surfaces = Self { points, faces, around };
-        surfaces.join();
+        let turning = surfaces.join();
+        surfaces.mirror(topology, &turning);
         surfaces
     }
 
-    /// Joins faces that go on in each other.
-    fn join(&mut self) {
+    /// Joins faces that go on in each other; returns the nodes of edges at which they turn.
+    fn join(&mut self) -> BTreeSet<NodeId> {
         let mut at_edge: BTreeMap<[NodeId; 2], Vec<(usize, usize)>> = BTreeMap::new();
         for (i, face) in self.faces.iter().enumerate() {
             for k in 0..3 {
@@ -122,6 +126,36 @@ impl<'a> CurvedSurfaces<'a> {
         joints.retain(|(_, pair)| !turns(*pair) || is_curved(pair.0.0) || is_curved(pair.1.0));
         for (_, ((i, k), (j, l))) in joints {
             (self.faces[i].next[k], self.faces[j].next[l]) = (Some(j), Some(i));
+        }
+        turning
+    }
+
+    /// Lets faces that end at an outer face of the mesh go on in their images, as in each other.
+    fn mirror(&mut self, topology: &Topology, turning: &BTreeSet<NodeId>) {
+        let mut outer: BTreeMap<[NodeId; 2], Vec<([NodeId; 3], Point)>> = BTreeMap::new();
+        for facet in topology.facets().iter().filter(|facet| facet.outside.is_none()) {
+            let area = area_vector(facet.nodes.map(|n| self.points[n.index()]));
+            for [a, b] in edges_of(facet.nodes) {
+                let known = self.around.contains_key(&a) && self.around.contains_key(&b) && norm(area) > 0.0;
+                if known {
+                    outer.entry(edge_key([a, b])).or_default().push((facet.nodes, unit(area)));
+                }
+            }
+        }
+        for face in &mut self.faces {
+            let normal = unit(face.area);
+            for (k, edge) in
+                edges_of(face.nodes).into_iter().enumerate().filter(|(k, _)| face.next[*k].is_none())
+            {
+                let mut behind = outer.get(&edge_key(edge)).into_iter().flatten();
+                let Some((_, plane)) = behind.find(|(nodes, _)| *nodes != face.nodes) else { continue };
+                let lean = dot(normal, *plane).abs();
+                let off_edge = face.nodes[(k + 2) % 3];
+                // The image leans as much the other way.
+                if 1.0 - 2.0 * lean * lean > SMOOTH && (lean < FLAT || turning.contains(&off_edge)) {
+                    face.mirror[k] = Some(*plane);
+                }
+            }
         }
     }
 
@@ -185,7 +219,8 @@ impl<'a> CurvedSurfaces<'a> {
                     planes.push(unit(rest));
                 }
             }
-            conditions.push((unit(area), volume / total));
+            let normal = self.closed_normal(node, &surface).unwrap_or_else(|| unit(area));
+            conditions.push((normal, volume / total));
         }
         let (mut matrix, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
         for (normal, height) in conditions {
@@ -233,15 +268,28 @@ impl<'a> CurvedSurfaces<'a> {
         }
     }
 
+    /// Normal at a node of a surface that goes around it, with its images; `None` at a rim.
+    fn closed_normal(&self, node: NodeId, surface: &[Directed]) -> Option<Point> {
+        let ends = surface.iter().flat_map(|&(i, _)| {
+            let face = &self.faces[i];
+            let is_end = move |k: &usize| face.next[*k].is_none() && face.edge(*k).contains(&node);
+            (0..3).filter(is_end).map(move |k| face.mirror[k])
+        });
+        let mut planes: Vec<Point> = Vec::new();
+        for plane in ends {
+            let rest = project_out(&planes, plane?);
+            if norm(rest) > SHARED {
+                planes.push(unit(rest));
+            }
+        }
+        Some(unit(project_out(&planes, sum(surface.iter().map(|own| self.area_of(*own))))))
+    }
+
     /// Normal of a face's surface at a node.
     fn normal(&self, node: NodeId, face: usize) -> Point {
         let mut surface = self.surface_at(node, face);
-        let is_closed = |&(i, _): &Directed| {
-            (0..3).all(|k| self.faces[i].next[k].is_some() || !self.faces[i].edge(k).contains(&node))
-        };
-        let is_rim = !surface.iter().all(is_closed);
-        if !is_rim {
-            return unit(sum(surface.iter().map(|own| self.area_of(*own))));
+        if let Some(normal) = self.closed_normal(node, &surface) {
+            return normal;
         }
         for own in surface.clone() {
             (0..3).for_each(|k| self.go_on(own, k, &mut surface));
@@ -330,8 +378,13 @@ struct RimFacet {
 impl Face {
     /// The edge from a node to the next one.
     fn edge(&self, k: usize) -> [NodeId; 2] {
-        [self.nodes[k], self.nodes[(k + 1) % 3]]
+        edges_of(self.nodes)[k]
     }
+}
+
+/// The edges of a triangle, from each node to the next one.
+fn edges_of(nodes: [NodeId; 3]) -> [[NodeId; 2]; 3] {
+    [0, 1, 2].map(|k| [nodes[k], nodes[(k + 1) % 3]])
 }
 
 /// The sum of vectors.
@@ -374,91 +427,4 @@ fn solve_symmetric([a, b, c]: [Point; 3], right: Point) -> Point {
 }
 
 #[cfg(test)]
-mod tests {
-    use std::f64::consts::PI;
-
-    use super::*;
-    use crate::Mesh;
-    use crate::generate::{BlockParameters, SphereParameters, block, sphere};
-    use crate::tet4::{centroid, volume};
-
-    /// An eighth of a ball of 50 mm in air, with the region of the ball.
-    fn ball(divisions: usize) -> (Mesh, RegionId) {
-        let parameters = SphereParameters { radius: 0.05, divisions, ..SphereParameters::default() };
-        let mesh = sphere(&parameters).expect("a ball");
-        let ball = mesh.topology().region("sphere").expect("it has one");
-        (mesh, ball)
-    }
-
-    /// The surfaces of the ball alone, and the outer planes.
-    fn surfaces(mesh: &Mesh) -> CurvedSurfaces<'_> {
-        CurvedSurfaces::new(mesh.topology(), mesh.points(), |_, _| true)
-    }
-
-    #[test]
-    fn the_facets_of_a_ball_are_off_it_by_the_height_of_their_arcs() {
-        let (mesh, ball) = ball(6);
-        let found = surfaces(&mesh).farthest().expect("it is curved");
-        // The outer sphere is the larger one, and only the outside.
-        let air = mesh.topology().region("air").expect("it has it");
-        let surface = mesh.topology().interface(ball, air);
-        assert!([ball, air].contains(&found.between.0) && found.between.1.is_some());
-        let edges = surface.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
-        let middle = |(a, b)| 0.05 - norm(centroid([mesh.point(a), mesh.point(b)]));
-        let height = edges.map(middle).fold(0.0, f64::max);
-        assert!((found.off / height - 1.0).abs() < 0.1, "{} {height}", found.off);
-        let place = centroid(found.ends.map(|n| mesh.point(n)));
-        assert!((0.05 - norm(place) - height).abs() < 0.2 * height);
-        let flat = block(&BlockParameters { size: [0.1; 3], cells: [3; 3] }).expect("a block");
-        assert_eq!(surfaces(&flat).farthest(), None);
-        assert!(surfaces(&flat).onto_surfaces().iter().all(|motion| *motion == [0.0; 3]));
-    }
-
-    /// Its volume is then that of the ball but for what the next order leaves, a share that falls with the size of the facets; its
-    /// planes stay planes.
-    #[test]
-    fn a_ball_whose_facets_lie_on_it_in_the_mean_has_its_volume() {
-        for divisions in [4, 6, 10] {
-            let (mesh, ball) = ball(divisions);
-            let motion = surfaces(&mesh).onto_surfaces();
-            let moved = mesh.moved(&motion).expect("no element turns over");
-            let of = |mesh: &Mesh| -> f64 {
-                let topology = mesh.topology();
-                topology.elements_of(ball).into_iter().map(|e| volume(mesh.vertices(e))).sum()
-            };
-            let exact = PI / 6.0 * 0.05f64.powi(3);
-            let [before, after] = [&mesh, &moved].map(|mesh| of(mesh) / exact - 1.0);
-            println!("{divisions}: {before:.5} {after:.5}");
-            let share = after.abs() / before.abs();
-            assert!(before < 0.0 && share < 0.2 / divisions as f64, "{before} {after}");
-            for (point, motion) in mesh.points().iter().zip(&motion) {
-                assert!((0..3).all(|d| point[d] > 1e-9 || motion[d].abs() < 1e-15), "{point:?} {motion:?}");
-            }
-        }
-    }
-
-    /// A block whose top is bent along a line into two planes of several cells, and one whose top is an arc of as many chords.
-    #[test]
-    fn an_edge_between_planes_is_none_of_a_curved_surface() {
-        let bent = |height: &dyn Fn(f64) -> f64| {
-            let flat = block(&BlockParameters { size: [0.1; 3], cells: [6; 3] }).expect("a block");
-            let [lower, upper] = flat.bounding_box();
-            let lift = |x: &Point| {
-                let share = (x[0] - lower[0]) / (upper[0] - lower[0]);
-                [0.0, 0.0, height(share) * (x[2] - lower[2]) / (upper[2] - lower[2])]
-            };
-            let lifts: Vec<Point> = flat.points().iter().map(lift).collect();
-            flat.moved(&lifts).expect("a sound mesh")
-        };
-        for slope in [0.1, 0.3, 0.6] {
-            let roof = bent(&|share| -slope * 0.1 * (share - 0.5).abs());
-            assert_eq!(surfaces(&roof).farthest(), None, "{slope}");
-        }
-        let arc = bent(&|share| -0.1 * (share - 0.5).powi(2));
-        let found = surfaces(&arc).farthest().expect("it is curved");
-        // A sixth of a parabola, under a slope of a third at the sides and none in the middle.
-        let height = 0.1 / (6.0f64 * 2.0).powi(2);
-        let ends = found.ends.map(|n| arc.point(n));
-        assert!((found.off / height - 1.0).abs() < 0.15, "{} {height} at {ends:?}", found.off);
-    }
-}
+mod tests;

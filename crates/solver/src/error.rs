@@ -104,12 +104,6 @@ pub enum SolverError {
     /// A region that must have elements has none.
     #[error("the region `{region}` has no elements: {expected}")]
     EmptyRegion { region: String, expected: &'static str },
-    /// A region without elements of its own is cut by two parallel outer planes along x, along y and along z.
-    #[error(
-        "the region `{region}` is replaced by its impedance surface and ends at two outer planes along each of x, y and \
-         z: its volume does not follow from that surface; mesh the region instead"
-    )]
-    Boxed { region: String },
     /// The iteration did not reach its residual.
     #[error(
         "the linear solver stopped at the relative residual {residual:.1e} after {iterations} iterations, not at the \

@@ -148,6 +148,23 @@ fn the_sources_of_several_coils_add_up() {
     }
 }
 
+#[test]
+fn a_mesh_that_lies_in_the_window_of_a_coil_has_no_current() {
+    let mesh = quarter_of_a_square_coil();
+    let terms = |half_window: f64| {
+        let winding =
+            Racetrack::new([0.0; 3], 2, [half_window; 2], 0.02, 0.4, Corner::Mitred).expect("a coil");
+        SourceTerms::new(
+            &mesh,
+            &[Coil { name: "ring".to_owned(), ampere_turns: c64::from(1.0), shape: winding.into() }],
+        )
+    };
+    let [_, most] = mesh.bounding_box();
+    assert!(terms(0.9 * most[0]).is_ok());
+    let refused = terms(1.1 * most[0].max(most[1])).expect_err("the winding lies outside").to_string();
+    assert!(refused.contains("the winding of the coil `ring` lies outside the mesh"), "{refused}");
+}
+
 /// A sheet of current between two walls: `B_y` is constant beside it and linear inside, `±½ μ0 J d` at its faces, where its slope
 /// jumps. The value at a point is that of its own side.
 #[test]

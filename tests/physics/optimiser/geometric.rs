@@ -21,9 +21,7 @@ fn wavy(problem: &Problem) -> Vec<f64> {
 const MESHED: [&str; 2] = ["regions.plate.model=\"volume\"", "remesh.region=[\"plate\", \"remesh\"]"];
 
 fn volume(setup: &Setup) -> Volume {
-    let problem = &setup.problem;
-    let surface = problem.states()[0].conductors().first().map(|plate| plate.surface.as_slice());
-    Volume::new(problem.original(), &setup.full_mesh, "plate", surface).expect("a plate has a volume")
+    Volume::new(setup.problem.original(), &setup.full_mesh, "plate").expect("a plate has a volume")
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! What objective and constraints ask of regions, bodies, coils and loads that these cannot give.
+//! What objective and constraints ask of regions, bodies, coils and loads that these cannot give, or that means little of them.
 
 use fluxmorph_geometry::Topology;
 
@@ -63,6 +63,33 @@ fn direct_loss_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
         Some(fault.expected(format!("`load` or `frequency` beside it, of one {ABOVE_ZERO_HERTZ}")))
     };
     losses.filter_map(fault).collect()
+}
+
+/// Ratios to losses of coils whose wire has none.
+pub(in crate::build) fn warnings(config: &Config) -> Vec<String> {
+    let without_loss = |name: &&String| {
+        let is_it = |own: &&config::Coil| own.name == **name;
+        config
+            .coils
+            .iter()
+            .find(is_it)
+            .is_some_and(|own| !own.is_solid() && own.resistance.unwrap_or(0.0) == 0.0)
+    };
+    let mut warnings = Vec::new();
+    for (path, own) in functionals(config) {
+        let what = match own.kind {
+            ObjectiveKind::QualityFactor => "quality factor",
+            ObjectiveKind::LinkEfficiency => "link efficiency",
+            _ => continue,
+        };
+        for name in own.coils.iter().flatten().filter(without_loss) {
+            warnings.push(format!(
+                "{path}: the coil `{name}` has no resistance, so that the {what} counts losses outside of its winding alone, and \
+                 without these has no bound; `resistance` of its [[coils]] is that of its wire"
+            ));
+        }
+    }
+    warnings
 }
 
 /// Masses of regions without density.

@@ -72,7 +72,8 @@ dimensions! {
         decimal("S/m", 0), decimal("kS/m", 3), decimal("MS/m", 6);
     /// A mass density [kg/m³].
     MassDensity = "a mass density", in "kg/m\u{b3}", such as "7850 kg/m3":
-        decimal("kg/m3", 0), decimal("kg/m\u{b3}", 0), decimal("g/cm3", 3), decimal("g/cm\u{b3}", 3);
+        decimal("kg/m3", 0), decimal("kg/m\u{b3}", 0), decimal("g/cm3", 3), decimal("g/cm\u{b3}", 3),
+        decimal("kg/dm3", 3), decimal("kg/l", 3), decimal("t/m3", 3);
     /// A current, or ampere-turns [A].
     Current = "a current", in "A", such as "40 kA":
         decimal("A", 0), decimal("mA", -3), decimal("kA", 3), decimal("MA", 6), decimal("AT", 0), decimal("kAT", 3);
@@ -125,7 +126,7 @@ dimensions! {
         decimal("Wb", 0), decimal("mWb", -3), decimal("uWb", -6), decimal("\u{b5}Wb", -6);
     /// A volume [m³].
     Volume = "a volume", in "m\u{b3}", such as "400 cm3":
-        decimal("m3", 0), decimal("m\u{b3}", 0), decimal("l", -3), decimal("cm3", -6),
+        decimal("m3", 0), decimal("m\u{b3}", 0), decimal("l", -3), decimal("ml", -6), decimal("cm3", -6),
         decimal("cm\u{b3}", -6), decimal("mm3", -9), decimal("mm\u{b3}", -9);
     /// A mass [kg].
     Mass = "a mass", in "kg", such as "2.5 kg":

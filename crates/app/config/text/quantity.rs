@@ -59,6 +59,14 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             ),
         });
     }
+    if let Some(fraction) =
+        unit_text.strip_prefix(',').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    {
+        return Err(QuantityError {
+            message: format!("`{written}` has a decimal comma"),
+            help: format!("write a decimal point: \"{}.{}\"", number.written, shown(fraction)),
+        });
+    }
     if dimension == Conductivity && RESISTIVITY.contains(&unit_text) {
         let help = match number.scaled(0).filter(|rho| *rho > 0.0) {
             Some(rho) => format!("conductivity is its reciprocal: write \"{:.6e} S/m\"", 1.0 / rho),
@@ -95,55 +103,53 @@ pub(in crate::config) fn is_number_with_unit(text: &str) -> bool {
     number.is_some() && unit.starts_with(|c: char| c.is_alphabetic() || c == '\u{b0}')
 }
 
-/// The unit of a few that another text was probably meant to be: one that differs by case alone before all others.
+/// The unit of a few that another text stands for, written otherwise: in other case, in full, with a sign for the power, as a plural,
+/// or with a wrong letter behind the first one. No other unit is offered however near: a letter more or less, one before it, and one
+/// of a part of it are powers of ten.
 fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
-    let by_name =
-        SPELLED_OUT.iter().filter(|(name, _)| text.eq_ignore_ascii_case(name)).map(|(_, unit)| *unit);
-    let is_prefix = |unit: &str| unit.starts_with(['m', 'M']) && unit.get(1..) == text.get(1..);
-    let by_case = known.iter().copied().find(|unit| unit.eq_ignore_ascii_case(text) && !is_prefix(unit));
-    by_case
-        .or_else(|| by_name.into_iter().find_map(|unit| known.iter().copied().find(|known| *known == unit)))
-        .or_else(|| nearest(text, known.iter().copied()).filter(|unit| !has_another_prefix(text, unit)))
-}
-
-/// Whether two units differ by the letter before them, which stands for a power of ten: none of these is a slip of the other.
-fn has_another_prefix(a: &str, b: &str) -> bool {
-    let rest = |unit: &str| unit.chars().skip(1).collect::<String>();
-    [rest(a) == rest(b), rest(a) == b, rest(b) == a].contains(&true)
+    let bare = text.replace(['^', '*', '.', ' '], "");
+    let singular = bare.strip_suffix('s').unwrap_or(&bare);
+    let of_name = SPELLED_OUT
+        .iter()
+        .find(|(name, _)| [text, singular].iter().any(|own| own.eq_ignore_ascii_case(name)));
+    let is_prefix = |unit: &str, text: &str| unit.starts_with(['m', 'M']) && unit.get(1..) == text.get(1..);
+    let written = [text, &bare, singular];
+    let by_case =
+        |unit: &&str| written.iter().any(|own| unit.eq_ignore_ascii_case(own) && !is_prefix(unit, own));
+    let known = |of: &dyn Fn(&&str) -> bool| known.iter().copied().find(|unit| of(unit));
+    let is_plain = |unit: &str| unit.chars().all(char::is_alphabetic);
+    let by_letter = |unit: &&str| {
+        let is_alike =
+            unit.chars().count() == text.chars().count() && unit.chars().next() == text.chars().next();
+        is_plain(text) && is_plain(unit) && is_alike && nearest(text, [*unit]).is_some()
+    };
+    known(&by_case)
+        .or_else(|| known(&|unit| of_name.is_some_and(|(_, named)| named == unit)))
+        .or_else(|| known(&by_letter))
 }
 
 /// Units by their full names.
 const SPELLED_OUT: &[(&str, &str)] = &[
     ("meter", "m"),
     ("metre", "m"),
-    ("meters", "m"),
-    ("metres", "m"),
     ("millimeter", "mm"),
     ("millimetre", "mm"),
-    ("millimeters", "mm"),
-    ("millimetres", "mm"),
     ("micron", "um"),
     ("inch", "in"),
     ("inches", "in"),
     ("hertz", "Hz"),
     ("ampere", "A"),
-    ("amperes", "A"),
     ("amp", "A"),
-    ("amps", "A"),
     ("tesla", "T"),
     ("gauss", "G"),
     ("degree", "deg"),
-    ("degrees", "deg"),
     ("\u{b0}", "deg"),
     ("second", "s"),
-    ("seconds", "s"),
     ("sec", "s"),
     ("minute", "min"),
-    ("minutes", "min"),
     ("hour", "h"),
     ("hours", "h"),
     ("watt", "W"),
-    ("watts", "W"),
     ("joule", "J"),
 ];
 
@@ -226,6 +232,10 @@ mod tests {
             ("2 l", Volume, 2e-3),
             ("300 g", Mass, 0.3),
             ("7.85 g/cm3", MassDensity, 7850.0),
+            ("7.85 kg/dm3", MassDensity, 7850.0),
+            ("7.85 kg/l", MassDensity, 7850.0),
+            ("7.85 t/m3", MassDensity, 7850.0),
+            ("180 ml", Volume, 180e-6),
         ];
         for (text, dimension, expected) in cases {
             assert_eq!(parse_quantity(text, dimension), Ok(expected), "{text}");
@@ -246,9 +256,19 @@ mod tests {
             ("10 MM", Length, "did you mean \"10 mm\"?"),
             ("5 MT", FluxDensity, "not a unit of flux density; write it like"),
             ("1e3 millimetres", Length, "did you mean \"1e3 mm\"?"),
+            ("20 mn", Length, "did you mean \"20 mm\"?"),
+            ("22 cm^3", Volume, "did you mean \"22 cm3\"?"),
+            ("7.85 g/cm^3", MassDensity, "did you mean \"7.85 g/cm3\"?"),
+            ("5 Ohms", Resistance, "did you mean \"5 ohm\"?"),
+            // A letter away from another unit, and a power of ten.
+            ("0.18 ul", Volume, "not a unit of volume; write it like"),
+            ("4.8 g/mm3", MassDensity, "not a unit of mass density; write it like"),
+            ("58 S/mm", Conductivity, "not a unit of conductivity; write it like"),
+            ("58 MS/cm", Conductivity, "not a unit of conductivity; write it like"),
             ("10", Length, "write its unit behind it, like \"10 mm\""),
             ("1.4e-7 Ohm m", Conductivity, "is a resistivity"),
             ("0 Ohm m", Conductivity, "is a resistivity"),
+            ("0,8 mm", Length, "write a decimal point: \"0.8 mm\""),
             ("1e400 m", Length, "too large"),
             ("1e99999999999 m", Length, "too large"),
             ("10 parsec", Length, "accepted units: m, cm, mm"),

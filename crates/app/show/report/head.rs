@@ -7,6 +7,7 @@ use super::iron;
 use super::markup::{Card, header};
 use super::observed;
 use super::plane::bounds;
+use super::tables::of_first_state;
 use super::ticks::{self, duration, group_digits, number, threads, trim_zeros};
 use super::words;
 use crate::build::Outline;
@@ -171,7 +172,8 @@ fn mean_card(data: &RunData, outline: &Outline) -> Option<Card> {
         Some(format!("{} mT", number(1e3 * mean, 4)))
     };
     let [before, after] = data.fields.each_ref().map(mean);
-    let regions = observed::region_names(data).join(", ");
+    let state = data.result.as_ref().map(of_first_state).unwrap_or_default();
+    let regions = observed::region_names(data).join(", ") + &state;
     let remark = before.map_or(regions.clone(), |before| format!("{before} before, in {regions}"));
     Some(("mean |B|", after?, remark))
 }

@@ -114,7 +114,7 @@ fn provenance(data: &RunData) -> Markup {
         (facts::provenance(data))
         @if let Some(resolved) = &data.resolved {
             details {
-                summary { "Resolved configuration, every default written out" }
+                summary { "Resolved configuration, with its defaults" }
                 @if resolved.len() <= LONGEST_CONFIGURATION {
                     pre tabindex="0" { code { (resolved) } }
                 } @else {

@@ -97,6 +97,7 @@ impl ThicknessBound {
 fn opposite_moves(shape: &Shape, thickness: &WallThickness) -> bool {
     let (map, designed) = (shape.motion().map(), shape.surface().nodes());
     thickness
-        .opposite_nodes()
+        .opposite_faces()
+        .flatten()
         .any(|n| designed.binary_search(&n).is_ok() || (0..3).any(|component| map.is_unknown(n, component)))
 }

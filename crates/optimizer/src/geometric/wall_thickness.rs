@@ -89,7 +89,10 @@ impl WallThickness {
             }
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
-                let (hit, nodes) = of[&body].nearest(origin, back)?;
+                let faces = &of[&body];
+                // Along the facets of a side that is round a ray from the rim meets one of them anywhere.
+                let beside = || faces.beside(origin, back).filter(|_| !faces.are_at_rim(node));
+                let (hit, nodes) = faces.opposite(origin, back).or_else(beside)?;
                 Some(Some(Opposite::new(&hit, *direction, (nodes, body))))
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
@@ -121,9 +124,9 @@ impl WallThickness {
         self.opposite.iter().enumerate().filter_map(|(i, opposite)| Some((i, (*opposite)?.distance)))
     }
 
-    /// Nodes of all triangles opposite, some repeatedly.
-    pub fn opposite_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
-        self.opposite.iter().flatten().flat_map(|opposite| opposite.nodes)
+    /// The triangle opposite of every design node that has one.
+    pub fn opposite_faces(&self) -> impl Iterator<Item = [NodeId; 3]> + '_ {
+        self.opposite.iter().flatten().map(|opposite| opposite.nodes)
     }
 
     /// The wall behind every design node that has one, with the node's place in the design surface, where every node of the
@@ -240,27 +243,32 @@ impl BodyFaces {
         self.designed_nodes.contains(&node) && self.other_nodes.contains(&node)
     }
 
-    /// The nearest face that a ray goes out through; one that it runs along, if there is no other.
-    fn nearest(&self, origin: Point, direction: Point) -> Option<(Hit, [NodeId; 3])> {
-        let hits = self.tree.hits(origin, direction);
+    /// The nearest face that a ray goes out through.
+    fn opposite(&self, origin: Point, direction: Point) -> Option<(Hit, [NodeId; 3])> {
         // From a rim the ray runs along the facets of the body's side, and a round side is no plane; at the foot of a step it meets
         // the rim of a face that it does not go through.
-        let goes_out = |i: &usize| {
-            let normal = area_vector(self.corners[*i]);
+        self.nearest(origin, direction, |corners| {
+            let normal = area_vector(*corners);
             dot(normal, direction) >= GRAZING * norm(normal)
-        };
-        let nearest = |of: &mut dyn Iterator<Item = usize>| {
-            let met = of.filter_map(|i| Some((hit(origin, direction, &self.corners[i])?, i)));
-            met.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance))
-        };
-        let found = nearest(&mut hits.iter().copied().filter(goes_out));
-        let along = || {
-            let (hit, i) = nearest(&mut hits.iter().copied())?;
-            // Of a face beside it, the distance to its point.
-            Some((Hit { normal: direction, ..hit }, i))
-        };
-        let (hit, i) = found.or_else(along)?;
-        Some((hit, self.nodes[i]))
+        })
+    }
+
+    /// The nearest face that a ray meets, which may run along it: with the distance to its point.
+    fn beside(&self, origin: Point, direction: Point) -> Option<(Hit, [NodeId; 3])> {
+        let (hit, nodes) = self.nearest(origin, direction, |_| true)?;
+        Some((Hit { normal: direction, ..hit }, nodes))
+    }
+
+    /// The nearest of the faces that count by their corners.
+    fn nearest(
+        &self,
+        origin: Point,
+        direction: Point,
+        counts: impl Fn(&[Point; 3]) -> bool,
+    ) -> Option<(Hit, [NodeId; 3])> {
+        let hits = self.tree.hits(origin, direction).into_iter().filter(|&i| counts(&self.corners[i]));
+        let met = hits.filter_map(|i| Some((hit(origin, direction, &self.corners[i])?, self.nodes[i])));
+        met.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance))
     }
 }
 

@@ -12,7 +12,7 @@
 
 use std::collections::HashMap;
 
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm};
+use fluxmorph_geometry::tet4::{Point, add, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId};
 
@@ -52,6 +52,9 @@ const ROUNDING: f64 = 1e-3;
 
 /// `T` over that of the window up to which it counts as zero.
 const NO_POTENTIAL: f64 = 1e-5;
+
+/// Share of a coil's size below which no part of it is looked for: the edges of a thinner winding would take seconds to follow.
+const THINNEST: f64 = 1e-5;
 
 /// Sine of the angle that a region's current may be off: 10°, more than the scatter of elements of constant current
 /// and less than any cut that is meant to be slanted.
@@ -121,7 +124,7 @@ pub fn racetrack_fault(
         let normal = area_vector(vertices);
         let normal = normal.map(|c| c / norm(normal));
         let across = sine(normal, coil.axis());
-        for place in samples(vertices, coil.detail() / 3.0) {
+        for place in places(coil, vertices) {
             let current = coil.current_density(place);
             if norm(current) > 0.0
                 && let Some(reason) = current_fault(condition, current, normal)
@@ -166,19 +169,25 @@ fn near(coil: &Racetrack, vertices: &[Point; 3]) -> bool {
     (0..3).all(|d| local.iter().any(|x| x[d] <= extent[d]) && local.iter().any(|x| x[d] >= -extent[d]))
 }
 
-/// Points inside a triangle, no farther apart than `spacing` [m] as long as they are not too many.
-fn samples(vertices: [Point; 3], spacing: f64) -> impl Iterator<Item = Point> {
-    const MOST: f64 = 64.0;
-    let edge = |a: usize, b: usize| norm(fluxmorph_geometry::tet4::sub(vertices[a], vertices[b]));
-    let longest = edge(0, 1).max(edge(1, 2)).max(edge(2, 0));
-    let steps = (longest / spacing).ceil().clamp(3.0, MOST) as usize;
-    (0..steps).flat_map(move |i| (0..steps - i).map(move |j| (i, j))).map(move |(i, j)| {
-        // Middles of the upright triangles of a regular division: never on an edge, where a coil may just touch.
-        let [s, t] = [i, j].map(|k| (k as f64 + 1.0 / 3.0) / steps as f64);
-        std::array::from_fn(|d| {
-            vertices[0][d] + s * (vertices[1][d] - vertices[0][d]) + t * (vertices[2][d] - vertices[0][d])
-        })
-    })
+/// Places of a triangle that stand for all of it, but for what is smaller than a third of the winding or [`THINNEST`]: the middles of
+/// its parts, quartered until each is all in the winding, in the window or beyond both. Never on an edge of the triangle, where a
+/// coil may just touch it.
+fn places(coil: &Racetrack, vertices: [Point; 3]) -> Vec<Point> {
+    let smallest = (coil.detail() / 3.0).max(THINNEST * coil.extent().into_iter().fold(0.0, f64::max));
+    let mut places = Vec::new();
+    let mut parts = vec![vertices];
+    while let Some(part) = parts.pop() {
+        let middles = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| add(part[i], part[j]).map(|c| 0.5 * c));
+        let longest = (0..3).map(|k| norm(sub(part[k], part[(k + 1) % 3]))).fold(0.0, f64::max);
+        if longest <= smallest || coil.is_alike_in(&part) {
+            places.push(centroid(part));
+        } else {
+            let ([a, b, c], [ab, bc, ca]) = (part, middles);
+            let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
+            parts.extend(quarters.into_iter().filter(|quarter| near(coil, quarter)));
+        }
+    }
+    places
 }
 
 /// A terminal must lie on a flux-parallel surface.
@@ -305,6 +314,31 @@ mod tests {
         let turned = square(0, 0.0, 0.3).into_iter().map(|t| t.map(|[_, y, z]| [0.1 * y, y, z])).collect();
         let slanted = fault(Condition::FluxParallel, turned).unwrap();
         assert!(matches!(slanted, PlaneFault::Slanting { angle } if (angle - 5.7).abs() < 0.1), "{slanted}");
+    }
+
+    /// A winding of a hundredth of the size and less of the faces that it meets.
+    #[test]
+    fn a_thin_winding_is_found_on_large_faces() {
+        for thickness in [4e-3, 4e-4, 4e-5] {
+            let size = [[thickness, thickness], [thickness, 0.1], [0.1, thickness]];
+            for [width, height] in size {
+                let corner = Corner::Round { inner_radius: 0.2 };
+                let ring = Racetrack::new([0.003, 0.01, 0.0], 2, [0.2; 2], width, height, corner).unwrap();
+                let fault = |condition, d, at| {
+                    racetrack_fault(&ring, condition, square(d, at, 0.7).into_iter())
+                        .map(|(_, reason)| reason)
+                };
+                let cut = fault(Condition::Open, 0, 0.0);
+                assert!(matches!(cut, Some(PlaneFault::Crossing { .. })), "{width} {height}: {cut:?}");
+                assert_eq!(fault(Condition::Open, 2, 0.0), None);
+                assert_eq!(fault(Condition::FluxParallel, 2, 0.5 * height), None);
+                let lengthwise = fault(Condition::FluxParallel, 2, 0.49 * height);
+                assert!(
+                    matches!(lengthwise, Some(PlaneFault::Slanting { .. })),
+                    "{width} {height}: {lengthwise:?}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -9,7 +9,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use fluxmorph_geometry::tet4::{Point, add};
+use fluxmorph_geometry::tet4::{Point, add, centroid};
 
 use super::frame::Frame;
 use crate::error::SolverError;
@@ -158,6 +158,24 @@ impl Racetrack {
         })
     }
 
+    /// Whether one point of a triangle stands for all of it, which lies in the window, in the winding or beyond both. The distance
+    /// outwards is convex: nowhere more than at one of the vertices, nor less than its tangent says.
+    pub(super) fn is_alike_in(&self, vertices: &[Point; 3]) -> bool {
+        let local = vertices.map(|x| self.frame.local(x));
+        let middle = centroid(local);
+        let [p, q] = self.outwards(middle);
+        let [least, _] = span(local.map(|x| p * (x[0] - middle[0]) + q * (x[1] - middle[1])));
+        let reach = local.map(|x| (x[0] - middle[0]).hypot(x[1] - middle[1])).into_iter().fold(0.0, f64::max);
+        let tangent = if p == 0.0 && q == 0.0 { -reach } else { least };
+        let nearest = self.distance(middle) + tangent;
+        let farthest = span(local.map(|x| self.distance(x)))[1];
+        let [lower, upper] = span(local.map(|x| 2.0 * x[2] / self.height));
+        let is_beyond = nearest >= (1.0 - SKIN) * self.width || lower >= 1.0 - SKIN || upper <= SKIN - 1.0;
+        let is_between_ends = lower >= -1.0 - SKIN && upper <= 1.0 + SKIN;
+        let is_one_part = farthest <= SKIN * self.width || (nearest >= 0.0 && farthest <= self.width);
+        is_beyond || is_between_ends && is_one_part
+    }
+
     /// Greatest `T_e` [A/m] for one ampere-turn: that of the window.
     pub fn plateau(&self) -> f64 {
         1.0 / self.height
@@ -243,6 +261,12 @@ impl Racetrack {
     pub(super) fn detail(&self) -> f64 {
         self.width.min(self.height)
     }
+}
+
+/// The least and the greatest of some numbers.
+fn span(numbers: [f64; 3]) -> [f64; 2] {
+    let [a, b, c] = numbers;
+    [a.min(b).min(c), a.max(b).max(c)]
 }
 
 fn check_sizes(sizes: &[(&str, f64)]) -> Result<(), SolverError> {

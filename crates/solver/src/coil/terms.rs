@@ -25,7 +25,7 @@ impl SourceTerms {
     /// The terms of coils on a mesh.
     ///
     /// # Errors
-    /// [`SolverError::NoSource`] for an analytic coil that meets no element.
+    /// [`SolverError::NoSource`] for an analytic coil whose winding meets no element.
     pub fn new(mesh: &Mesh, coils: &[Coil]) -> Result<Self, SolverError> {
         let (mut all, mut windows, mut cut, mut currents) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for coil in coils {
@@ -33,11 +33,16 @@ impl SourceTerms {
             match &coil.shape {
                 CoilShape::Racetrack(racetrack) => {
                     let moments = moments(racetrack, mesh);
-                    if moments.is_empty() {
+                    let is_wound = |(e, _): &(ElementId, _)| {
+                        let vertices = mesh.vertices(*e);
+                        !racetrack.encloses(&vertices) && racetrack.wound_place(vertices).is_some()
+                    };
+                    // A mesh that lies in the window alone has no current.
+                    if !moments.iter().any(is_wound) {
                         return Err(SolverError::NoSource {
                             coil: coil.name.clone(),
                             cause: format!(
-                                "the coil `{}` lies outside the mesh; check its centre and the mesh unit",
+                                "the winding of the coil `{}` lies outside the mesh; check its centre, its sizes and the mesh unit",
                                 coil.name
                             ),
                         });

@@ -124,6 +124,19 @@ impl Force {
                 return Err(fault(e, "a winding"));
             }
         }
+        // Current flows in the surfaces that stand for conductors, which have no element.
+        let faces =
+            model.conductors().iter().flat_map(|own| own.surface.iter().map(move |face| (own, *face)));
+        for (conductor, face) in faces {
+            if face.iter().any(|node| body.contains_key(node)) {
+                return Err(SolverError::Layer {
+                    body: name.to_owned(),
+                    region: conductor.name.clone(),
+                    place: centroid(face.map(|node| mesh.point(node))),
+                    what: "the surface of a conductor",
+                });
+            }
+        }
         Ok(Self { layer: layer.into_iter().collect(), body, motion })
     }
 

@@ -1,24 +1,23 @@
 //! Volume of a region on the moved mesh, or its mass: a function of the shape alone, which no field has a say in.
 //!
 //! Of a meshed region: the sum of its tetrahedra, `∂V_e/∂x_a = V_e ∇N_a`. Of a region that an impedance surface replaces
-//! only the exposed surface `S` is left. With a field `q` of `div q = 1` whose normal component vanishes on the outer
-//! planes that close `S`, the divergence theorem gives
+//! no element is left, but all of its faces are known: those that are exposed, and those that close them, at the outside
+//! and towards other regions that are replaced. They enclose
 //!
-//! `V(x) = V(x₀) + ∫_S(x) q·n dA − ∫_S(x₀) q·n dA`, `q_i = w_i (x_i − o_i)`, `Σ w_i = 1`:
+//! `V = 1/6 Σ a·(b × c)` over triangles out of the region with corners `a`, `b`, `c` from any one place, `∂V/∂a = (b × c)/6`.
 //!
-//! along an axis with one closing plane, `o_i` is that plane; with two (a slab between planes) `w_i = 0`; else any `o_i`
-//! does. What else closes `S`, such as a curved outer face, adds a constant, as nothing moves there. `q` is linear, so the
-//! flux through a triangle is `q(centroid) · area vector`, exactly. Both sums run in the order of the elements or
+//! Corners in a closing face alone stay where they were. While its rim moves within the plane of such a face, `V` is exact
+//! whatever becomes of the triangles there: in a plane only the rim counts. Both sums run in the order of the elements or
 //! triangles, whatever the number of threads.
 
-use fluxmorph_geometry::tet4::{Point, Tet4, area_vector, centroid, cross, dot, sub};
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::tet4::{Point, Tet4, cross, dot, sub};
+use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, tet4};
 
 use super::FunctionalValue;
 use crate::error::SolverError;
-
-/// Largest component of a unit normal across its axis for a plane: coordinates in files carry 6 or more digits.
-const PLANE_TOLERANCE: f64 = 1e-6;
 
 /// Volume [m³] of a region, or its mass [kg].
 #[derive(Clone, Debug)]
@@ -31,44 +30,39 @@ pub struct Volume {
 #[derive(Clone, Debug)]
 enum Extent {
     Meshed(Vec<ElementId>),
-    Exposed {
-        /// Oriented into the region.
-        triangles: Vec<[NodeId; 3]>,
-        flux: FluxField,
-        /// `V(x₀)` plus the flux into the region on the reference mesh [m³].
-        constant: f64,
+    Enclosed {
+        /// Out of the region.
+        faces: Vec<[Corner; 3]>,
+        /// From where corners are measured [m]: a place of the region, near which little cancels.
+        origin: Point,
     },
 }
 
+/// A corner of a face.
+#[derive(Clone, Copy, Debug)]
+enum Corner {
+    Node(NodeId),
+    /// No node of the mesh that moves [m].
+    Still(Point),
+}
+
 impl Volume {
-    /// The volume of a region: of `reference`, the mesh that moves, where the region is meshed; inside
-    /// `impedance_surface` where that replaces it. The surface consists of triangles of `reference` oriented out of it;
-    /// `full_mesh` has the region and the coordinates of `reference`.
+    /// The volume of a region: of `reference`, the mesh that moves, where the region is meshed there; else what its faces
+    /// enclose in `full_mesh`, which has the region and the coordinates of `reference`.
     ///
     /// # Errors
-    /// [`SolverError::Mesh`] for an unknown name, [`SolverError::EmptyRegion`], [`SolverError::Boxed`].
-    pub fn new(
-        reference: &Mesh,
-        full_mesh: &Mesh,
-        region_name: &str,
-        impedance_surface: Option<&[[NodeId; 3]]>,
-    ) -> Result<Self, SolverError> {
-        let mesh = if impedance_surface.is_some() { full_mesh } else { reference };
-        let region = mesh.topology().region(region_name)?;
-        let elements = mesh.topology().elements_of(region);
-        if elements.is_empty() {
-            let expected = "name a region that is meshed, whose volume is defined";
-            return Err(SolverError::EmptyRegion { region: region_name.to_owned(), expected });
-        }
-        let extent = match impedance_surface {
-            None => Extent::Meshed(elements),
-            Some(triangles) => {
-                let flux = FluxField::new(full_mesh, region)
-                    .ok_or_else(|| SolverError::Boxed { region: region_name.to_owned() })?;
-                let triangles = triangles.to_vec();
-                let volume: f64 = elements.iter().map(|&e| tet4::volume(full_mesh.vertices(e))).sum();
-                Extent::Exposed { constant: volume + flux.through(reference, &triangles), triangles, flux }
-            }
+    /// [`SolverError::Mesh`] for an unknown name, [`SolverError::EmptyRegion`].
+    pub fn new(reference: &Mesh, full_mesh: &Mesh, region_name: &str) -> Result<Self, SolverError> {
+        let elements = |mesh: &Mesh| {
+            Ok::<_, SolverError>(mesh.topology().elements_of(mesh.topology().region(region_name)?))
+        };
+        let extent = match elements(reference)? {
+            meshed if !meshed.is_empty() => Extent::Meshed(meshed),
+            _ => Extent::enclosed(reference, full_mesh, full_mesh.topology().region(region_name)?)
+                .ok_or_else(|| {
+                    let expected = "name a region that is meshed, whose volume is defined";
+                    SolverError::EmptyRegion { region: region_name.to_owned(), expected }
+                })?,
         };
         Ok(Self { extent, factor: 1.0 })
     }
@@ -82,7 +76,11 @@ impl Volume {
     pub fn value(&self, mesh: &Mesh) -> f64 {
         let volume: f64 = match &self.extent {
             Extent::Meshed(elements) => elements.iter().map(|&e| tet4::volume(mesh.vertices(e))).sum(),
-            Extent::Exposed { triangles, flux, constant } => constant - flux.through(mesh, triangles),
+            Extent::Enclosed { faces, origin } => faces
+                .iter()
+                .map(|face| face.map(|corner| corner.seen_from(*origin, mesh)))
+                .map(|[a, b, c]| dot(a, cross(b, c)) / 6.0)
+                .sum(),
         };
         self.factor * volume
     }
@@ -109,11 +107,13 @@ impl Volume {
                     }
                 }
             }
-            Extent::Exposed { triangles, flux, .. } => {
-                for triangle in triangles {
-                    let derivative = flux.derivative(triangle.map(|n| mesh.point(n)));
-                    for (&node, g) in triangle.iter().zip(derivative) {
-                        add(node, g, -self.factor);
+            Extent::Enclosed { faces, origin } => {
+                for face in faces {
+                    let seen = face.map(|corner| corner.seen_from(*origin, mesh));
+                    for (k, corner) in face.iter().enumerate() {
+                        if let Corner::Node(node) = *corner {
+                            add(node, cross(seen[(k + 1) % 3], seen[(k + 2) % 3]), self.factor / 6.0);
+                        }
                     }
                 }
             }
@@ -122,102 +122,131 @@ impl Volume {
     }
 }
 
-/// `q_i = weights_i (x_i − origin_i)`, a field of divergence 1.
-#[derive(Clone, Debug)]
-struct FluxField {
-    weights: Point,
-    /// [m]
-    origin: Point,
-}
-
-impl FluxField {
-    /// A field that does not cross the outer planes of a region; `None` where there are two along every axis.
-    fn new(mesh: &Mesh, region: RegionId) -> Option<Self> {
-        let topology = mesh.topology();
-        let [lower, upper] = mesh.bounding_box();
-        let mut planes: [Vec<f64>; 3] = Default::default();
-        for facet in topology.facets().iter().filter(|f| f.outside.is_none()) {
-            if topology.region_of()[facet.inside.index()] != region {
-                continue;
+impl Extent {
+    /// What the faces of a region of `full` enclose, whose nodes at the places of nodes of `reference` are these; `None`
+    /// without faces.
+    fn enclosed(reference: &Mesh, full: &Mesh, region: RegionId) -> Option<Self> {
+        let topology = full.topology();
+        let is_own = |e: ElementId| topology.region_of()[e.index()] == region;
+        let out = |facet: &Facet| match (is_own(facet.inside), facet.outside.is_some_and(is_own)) {
+            (true, false) => Some(facet.nodes),
+            (false, true) => {
+                let [a, b, c] = facet.nodes;
+                Some([a, c, b])
             }
-            let vertices = facet.nodes.map(|n| mesh.point(n));
-            let Some(axis) = normal_axis(vertices) else { continue };
-            let (at, tolerance) = (centroid(vertices)[axis], PLANE_TOLERANCE * (upper[axis] - lower[axis]));
-            if !planes[axis].iter().any(|plane| (plane - at).abs() <= tolerance) {
-                planes[axis].push(at);
+            _ => None,
+        };
+        let faces: Vec<[NodeId; 3]> = topology.facets().iter().filter_map(out).collect();
+        let key = |point: Point| point.map(f64::to_bits);
+        let mut moving: BTreeMap<_, Option<NodeId>> =
+            faces.iter().flatten().map(|&n| (key(full.point(n)), None)).collect();
+        for node in reference.topology().nodes() {
+            if let Some(own) = moving.get_mut(&key(reference.point(node))) {
+                *own = Some(node);
             }
         }
-        let open = planes.iter().filter(|planes| planes.len() < 2).count();
-        let weight = |planes: &Vec<f64>| if planes.len() < 2 { 1.0 / open as f64 } else { 0.0 };
-        let origin = |planes: &Vec<f64>| planes.first().copied().unwrap_or(0.0);
-        (open > 0)
-            .then(|| Self { weights: planes.each_ref().map(weight), origin: planes.each_ref().map(origin) })
-    }
-
-    fn at(&self, point: Point) -> Point {
-        std::array::from_fn(|i| self.weights[i] * (point[i] - self.origin[i]))
-    }
-
-    /// `∫ q·n dA` over the triangles [m³].
-    fn through(&self, mesh: &Mesh, triangles: &[[NodeId; 3]]) -> f64 {
-        let flux = |triangle: &[NodeId; 3]| {
-            let vertices = triangle.map(|n| mesh.point(n));
-            dot(self.at(centroid(vertices)), area_vector(vertices))
+        let corner = |n: NodeId| match moving[&key(full.point(n))] {
+            Some(node) => Corner::Node(node),
+            None => Corner::Still(full.point(n)),
         };
-        triangles.iter().map(flux).sum()
-    }
-
-    /// `∂/∂x_k` of the flux through one triangle [m²], shape `(3, 3)`.
-    ///
-    /// `A = ½ x_k × (x_{k+1} − x_{k+2}) + …`, so `q·dA = ½ ((x_{k+1} − x_{k+2}) × q)·dx_k`; and `dq = w dx_k / 3`.
-    fn derivative(&self, vertices: [Point; 3]) -> [Point; 3] {
-        let (area, q) = (area_vector(vertices), self.at(centroid(vertices)));
-        std::array::from_fn(|k| {
-            let turned = cross(sub(vertices[(k + 1) % 3], vertices[(k + 2) % 3]), q);
-            std::array::from_fn(|d| self.weights[d] * area[d] / 3.0 + 0.5 * turned[d])
-        })
+        let origin = full.point(faces.first()?[0]);
+        Some(Self::Enclosed { faces: faces.iter().map(|face| face.map(corner)).collect(), origin })
     }
 }
 
-/// The axis that a triangle is normal to.
-fn normal_axis(vertices: [Point; 3]) -> Option<usize> {
-    let area = area_vector(vertices);
-    let length = tet4::norm(area);
-    (0..3).find(|&axis| (0..3).all(|d| d == axis || area[d].abs() <= PLANE_TOLERANCE * length))
+impl Corner {
+    /// The vector from a place to it [m].
+    fn seen_from(self, origin: Point, mesh: &Mesh) -> Point {
+        match self {
+            Self::Node(node) => sub(mesh.point(node), origin),
+            Self::Still(point) => sub(point, origin),
+        }
+    }
 }
-
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
+    use fluxmorph_geometry::generate::{BoxRegion, BoxesParameters, boxes};
+
     use super::*;
 
-    #[test]
-    fn the_flux_through_a_triangle_has_its_derivative() {
-        let flux = FluxField { weights: [0.5, 0.2, 0.3], origin: [0.1, -0.4, 0.7] };
-        let vertices = [[0.1, 0.2, 0.3], [1.0, 0.3, -0.2], [0.4, 1.1, 0.6]];
-        let value = |v: [Point; 3]| dot(flux.at(centroid(v)), area_vector(v));
-        let derivative = flux.derivative(vertices);
-        for (k, d) in (0..3).flat_map(|k| (0..3).map(move |d| (k, d))) {
-            let shifted = |h: f64| {
-                let mut v = vertices;
-                v[k][d] += h;
-                value(v)
-            };
-            // The flux is quadratic in one coordinate: a central difference is exact up to rounding, 1e-16 / 1e-3.
-            let difference = (shifted(1e-3) - shifted(-1e-3)) / 2e-3;
-            assert!((derivative[k][d] - difference).abs() < 1e-12, "{k} {d}");
-        }
+    /// Two bodies beside each other under a gap, all to the outside, away from the origin and turned about z: no plane that
+    /// closes a body leads through the origin, or is at right angles to an axis.
+    fn two_bodies() -> Mesh {
+        let region = |name: &str, lower: Point, upper: Point| BoxRegion {
+            name: name.to_owned(),
+            corners: [lower, upper],
+            size: [0.25, 0.5, 0.25],
+            skin: [f64::INFINITY; 3],
+            cells: None,
+        };
+        let parameters = BoxesParameters {
+            corners: [[0.0; 3], [2.0, 1.0, 2.0]],
+            regions: vec![
+                region("left", [0.0; 3], [0.5, 1.0, 1.0]),
+                region("right", [0.5, 0.0, 0.0], [2.0, 1.0, 1.0]),
+            ],
+            sizes: Vec::new(),
+            surfaces: Vec::new(),
+            growth: 1.5,
+            refinement: 1.0,
+            division: None,
+        };
+        let mesh = boxes(&parameters).expect("two bodies");
+        let place = |&[x, y, z]: &Point| [0.8 * x - 0.6 * y + 7.0, 0.6 * x + 0.8 * y - 3.0, z + 5.0];
+        let points = mesh.points().iter().map(place).collect();
+        Mesh::new(Arc::clone(mesh.topology()), points).expect("it is turned and moved")
+    }
+
+    /// Their faces towards the gap go up by `0.05 + 0.05 x`, `x` along the row.
+    fn lifted(mesh: &Mesh) -> Mesh {
+        let lift = |&[x, y, z]: &Point| {
+            let along = 0.8 * (x - 7.0) + 0.6 * (y + 3.0);
+            [0.0, 0.0, if (z - 6.0).abs() < 1e-9 { 0.05 + 0.05 * along } else { 0.0 }]
+        };
+        mesh.moved(&mesh.points().iter().map(lift).collect::<Vec<_>>()).expect("less than a cell")
     }
 
     #[test]
-    fn a_region_between_planes_is_measured_along_the_open_axis() {
-        let mesh = fluxmorph_geometry::generate::block(&fluxmorph_geometry::generate::BlockParameters {
-            size: [1.0; 3],
-            cells: [2; 3],
-        })
-        .expect("a block");
-        let region = mesh.topology().region("block").expect("it has one");
-        assert!(FluxField::new(&mesh, region).is_none(), "two planes along every axis");
-        let missing = Volume::new(&mesh, &mesh, "blok", None).expect_err("no such region");
-        assert!(missing.to_string().contains("blok"), "{missing}");
+    fn bodies_that_are_replaced_have_their_volume_whatever_closes_them() {
+        let full = two_bodies();
+        let removed = |mesh: &Mesh, name: &str| {
+            mesh.without_region(mesh.topology().region(name).expect("a body")).expect("more is left").0
+        };
+        let left_out = removed(&full, "left");
+        for mesh in [&full, &left_out, &removed(&left_out, "right")] {
+            let moved = lifted(mesh);
+            // 0.5 and 1.5 wide; the mean lift is 0.05 + 0.05 · 0.25 and 0.05 + 0.05 · 1.25.
+            for (name, volume, grown) in [("left", 0.5, 0.03125), ("right", 1.5, 0.16875)] {
+                let body = Volume::new(mesh, &full, name).expect("a body").with_density(2.0);
+                let found = [mesh, &moved].map(|mesh| body.value(mesh));
+                let wanted = [volume, volume + grown].map(|volume| 2.0 * volume);
+                assert!((0..2).all(|k| (found[k] - wanted[k]).abs() < 1e-12), "{name}: {found:?} {wanted:?}");
+            }
+        }
+        let missing = Volume::new(&full, &full, "lefd").expect_err("no such region");
+        assert!(missing.to_string().contains("lefd"), "{missing}");
+    }
+
+    /// A volume is linear in every coordinate: a central difference is exact up to rounding, 1e-16 / 1e-3.
+    #[test]
+    fn what_faces_enclose_has_its_derivative_by_every_node() {
+        let full = two_bodies();
+        let region = full.topology().region("left").expect("a body");
+        let mesh = lifted(&full.without_region(region).expect("more is left").0);
+        let body =
+            Volume::new(&full.without_region(region).expect("as before").0, &full, "left").expect("a body");
+        let derivative = body.node_derivative(&mesh);
+        assert!(derivative.iter().filter(|g| **g != [0.0; 3]).count() > 10);
+        for (node, d) in (0..mesh.points().len()).flat_map(|node| (0..3).map(move |d| (node, d))) {
+            let shifted = |h: f64| {
+                let mut motion = vec![[0.0; 3]; mesh.points().len()];
+                motion[node][d] = h;
+                body.value(&mesh.moved(&motion).expect("far less than a cell"))
+            };
+            let difference = (shifted(1e-3) - shifted(-1e-3)) / 2e-3;
+            assert!((derivative[node][d] - difference).abs() < 1e-12, "{node} {d}");
+        }
     }
 }

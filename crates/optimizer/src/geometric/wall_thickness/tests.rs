@@ -119,6 +119,24 @@ fn a_ray_that_misses_the_body_at_a_rim_costs_no_other_node_its_thickness() {
     assert!(thickness.at_nodes().all(|(_, t)| (t - 0.1 / angle.cos()).abs() < 1e-12));
 }
 
+/// A side that bulges by less than a tenth, as facets of a round one may: the ray from the rim leaves through it half-way down.
+#[test]
+fn a_rim_of_a_round_body_has_no_thickness_to_its_side() {
+    let flat = parts([[-1.0; 3], [2.0; 3]], 0.25, &[("body", [[0.0; 3], [1.0, 1.0, 1.0]])]);
+    let bulge = |&[x, _, z]: &Point| {
+        let outwards = if x == 0.0 && (0.0..=1.0).contains(&z) { 0.06 * (1.0 - z) * (z - 0.3) } else { 0.0 };
+        [-outwards, 0.0, 0.0]
+    };
+    let mesh =
+        flat.moved(&flat.points().iter().map(bulge).collect::<Vec<_>>()).expect("far less than a cell");
+    let surface = faces_at(&mesh, &[1.0], Direction::Along([0.0, 0.0, 1.0]));
+    let body = mesh.topology().region("body").expect("it is there");
+    let thickness = WallThickness::measure(&mesh, &[body], &surface).expect("most rays meet its lower face");
+    let inner = surface.nodes().iter().filter(|n| mesh.point(**n)[0] > 0.0).count();
+    assert_eq!(thickness.at_nodes().count(), inner);
+    assert!(thickness.at_nodes().all(|(_, t)| (t - 1.0).abs() < 1e-12));
+}
+
 /// A high plate on a wide one, both tops designed: rays at the edge of the step run along its side, past the wide plate's top.
 #[test]
 fn a_wall_does_not_end_at_the_foot_of_a_step() {
