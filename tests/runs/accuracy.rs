@@ -181,6 +181,8 @@ fn a_tolerance_that_the_refinements_do_not_reach_is_said_to_be_missed() {
     assert_eq!(result["accuracy"]["within_tolerance"], false);
     let page = std::fs::read_to_string(out.join("report.html")).expect("a report");
     assert!(page.contains("beyond the tolerance"));
+    let again = finish(&mut command(&[&"solve", &out.join("result.json")])).exits_with(0).stderr;
+    assert!(again.contains("the run of this design refined its mesh (refinements: 1)"), "{again}");
 }
 
 /// The time of a run is that of its refinements too: without any left, the initial design is evaluated on the mesh as it is.

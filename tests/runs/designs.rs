@@ -128,6 +128,10 @@ fn the_thickness_of_a_body_that_a_plane_halves_is_said_to_be_that_of_the_half() 
     let path = home.path().join("halved.toml");
     std::fs::write(&path, HALVED).expect("a configuration");
     let checked = finish(&mut command(&[&"check", &path])).exits_with(0);
-    let said = "design nodes the body ends at the outside of the mesh, as at `z_min`, and its thickness is that of the meshed part";
+    let said = "design nodes ends at `z_min`, at the outside of the mesh, and is that of the meshed part";
     assert!(checked.stderr.contains(said), "{}", checked.stderr);
+    // On halved edges no thickness is measured.
+    let solved = finish(&mut command(&[&"solve", &path, &"--refine", &"1"])).exits_with(0);
+    let left_out = "constraints on the shape are not looked at on a refined mesh: `thickness`";
+    assert!(solved.stderr.contains(left_out), "{}", solved.stderr);
 }

@@ -20,11 +20,11 @@ fn a_force_on_air_and_one_on_a_part_of_the_iron_are_asked_about() {
     // The air around it holds the winding, whose force it is.
     assert!(!of("air").contains("no force acts"));
     let part = of("tip");
-    assert!(part.contains("`body` is joined to the iron of `iron`"), "{part}");
+    assert!(part.contains("`body` touches the iron of `iron`"), "{part}");
     // Of no permeability of its own, and beside linear iron.
     let magnet = ["materials.ferrite={}", "regions.tip={material=\"ferrite\",remanence=[0,0,\"0.4 T\"]}"];
     let part = with("tip", &magnet);
-    assert!(part.contains("`body` is joined to the iron of `iron`"), "{part}");
+    assert!(part.contains("`body` touches the iron of `iron`"), "{part}");
     let alone = finish(&mut command(&[&"check", &repository("configs/actuator.toml"), &"--json"]));
     assert_eq!(texts(&alone.exits_with(0).json()["warnings"]), "");
 }
@@ -33,10 +33,8 @@ fn a_force_on_air_and_one_on_a_part_of_the_iron_are_asked_about() {
 fn a_force_beside_the_surface_of_a_conductor_is_refused() {
     let forces = "forces=[{name=\"body\",regions=[\"observation\",\"remesh\"]}]";
     let refused = finish(command(&[&"check", &quick()]).args(set(&[forces]))).exits_with(3).stderr;
-    assert!(
-        refused.contains("the surface of a conductor in `plate`") && refused.contains("a layer of air"),
-        "{refused}"
-    );
+    let said = "`body` touches the surface that stands for `plate`";
+    assert!(refused.contains(said) && refused.contains("a layer of air"), "{refused}");
 }
 
 #[test]
@@ -54,6 +52,7 @@ fn a_force_across_a_plane_that_cuts_its_body_is_asked_about() {
     assert!(!along("[0, 0, -1]").contains("cuts the body"));
 }
 
+/// The shell stands for all of space: the stress in it is not that of its elements.
 #[test]
 fn a_force_is_not_taken_in_the_shell_of_open_space() {
     let home = folder();

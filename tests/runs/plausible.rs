@@ -200,7 +200,6 @@ fn a_device_in_open_space_needs_no_condition() {
     assert!(!texts(&json["warnings"]).contains("no surface has a condition"), "{}", json["warnings"]);
 }
 
-/// The shell stands for all of space: the stress in it is not that of its elements.
 /// Rings in cells of their width, of twice and of ten times that have 10, 17 and 37 % too little.
 #[test]
 fn a_winding_thinner_than_its_elements_is_said_to_have_too_little_inductance() {

@@ -46,9 +46,8 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
     let mut outside = topology.region_names().iter().filter(|name| !body.regions.contains(name));
     let joined = outside.find(|name| is_iron(name.as_str()) && topology.region(name).is_ok_and(touches))?;
     Some(format!(
-        "the body `{name}` is joined to the iron of `{joined}`: the force on it is taken in the elements around it, which where they \
-         are iron do not hold the field at its face, and depends on the mesh; take `{joined}` into its regions, or leave air between \
-         the two"
+        "the body `{name}` touches the iron of `{joined}`: its force is taken in the elements around it, those in iron do not hold the \
+         field at its face, and the result depends on the mesh; take `{joined}` into its regions, or leave air between the two"
     ))
 }
 

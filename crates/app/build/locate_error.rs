@@ -198,6 +198,7 @@ impl Blame<'_> {
             }
             SolverError::SolidOnRanks { coil } => self.at(&format!("{}.conductor", self.coil(coil)?), error),
             SolverError::Layer { body, .. }
+            | SolverError::TouchesConductor { body, .. }
             | SolverError::NoLayer { body }
             | SolverError::ForceInShell { body, .. } => {
                 let index = self.config.forces.iter().position(|own| own.name == *body)?;

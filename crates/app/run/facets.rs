@@ -364,7 +364,7 @@ impl Change {
         for (k, (name, share)) in shares.into_iter().enumerate().filter(|(_, (_, share))| share.abs() < 1.0) {
             let bar = estimated.map_or(0.0, |all| SAFETY * all[k].1.abs());
             self.exceeds |= share.abs() > bar.max(MATTERS);
-            // What its error bar holds may be zero.
+            // A quantity whose error bar is as large may be zero, and is not named.
             if bar < 1.0 && share.abs() > self.most.as_ref().map_or(0.0, |(_, most)| most.abs()) {
                 self.most = Some((name, share));
             }

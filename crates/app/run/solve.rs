@@ -37,8 +37,8 @@ pub fn solve(
         design.check_tables(&prepared.setup.tables)?;
         if let Some(count) = design.refinements_of_run().filter(|_| halvings == 0) {
             observer.notice(&format!(
-                "the run of this design refined its mesh {count} times, and its numbers are of that mesh; analysed is the mesh that it \
-                 began with, whose errors are larger: --refine 1 halves its edges"
+                "the run of this design refined its mesh (refinements: {count}), and its numbers are of that mesh; this analysis takes the \
+                 mesh that it began with, whose errors are larger: --refine 1 halves its edges"
             ));
         }
     }

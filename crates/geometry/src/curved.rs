@@ -2,7 +2,7 @@
 //!
 //! A surface is taken from its facets alone: with its normals `n` at the ends of an edge `e`, its middle lies `s = (n_b − n_a)·e/8`
 //! over the edge, exactly so of a circle (`L²/(8R)`). Over a triangle with its nodes on the surface this is a quadratic function,
-//! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around, and of their images in the
+//! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around by their angles there, and of their images in the
 //! outer faces of the mesh that end them, so that a part of a device has the surfaces of the whole; where there are faces on one
 //! side only, it goes on as from the faces behind to them.
 //!
@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ids::{NodeId, RegionId};
 use crate::tet4::{Point, add, area_vector, centroid, cross, dot, norm, sub};
-use crate::topology::{Facet, Topology, edge_key};
+use crate::topology::{Facet, Topology, edge_key, triangle_edges};
 
 /// Cosine of the largest angle, 42°, at which two facets are taken for one curved surface: a ball with nine of them along a circle,
 /// and no chamfer of 45°.
@@ -59,6 +59,9 @@ struct Face {
 /// A face of a surface, with the direction of another face of it: 1, or −1 where it is the other one.
 type Directed = (usize, f64);
 
+/// A face, and the place of one of its edges.
+type Side = (usize, usize);
+
 /// The edge of a surface that is farthest off it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Farthest {
@@ -94,69 +97,70 @@ impl<'a> CurvedSurfaces<'a> {
             face.nodes.iter().for_each(|&n| around.entry(n).or_default().push(i));
         }
         let mut surfaces = Self { points, faces, around };
-        let turning = surfaces.join();
-        surfaces.mirror(topology, &turning);
+        surfaces.join(topology);
         surfaces
     }
 
-    /// Joins faces that go on in each other; returns the nodes of edges at which they turn.
-    fn join(&mut self) -> BTreeSet<NodeId> {
-        let mut at_edge: BTreeMap<[NodeId; 2], Vec<(usize, usize)>> = BTreeMap::new();
+    /// Joins faces that go on in each other, and in their images in outer planes.
+    fn join(&mut self, topology: &Topology) {
+        let mut at_edge: BTreeMap<[NodeId; 2], Vec<Side>> = BTreeMap::new();
         for (i, face) in self.faces.iter().enumerate() {
-            for k in 0..3 {
-                let mut ends = face.edge(k);
-                ends.sort_unstable();
-                at_edge.entry(ends).or_default().push((i, k));
-            }
+            (0..3).for_each(|k| at_edge.entry(edge_key(face.edge(k))).or_default().push((i, k)));
         }
         let mut joints = Vec::new();
         for (ends, sides) in &at_edge {
             let pairs =
                 sides.iter().enumerate().flat_map(|(n, a)| sides[n + 1..].iter().map(move |b| (*a, *b)));
-            let straightness = |&(a, b): &((usize, usize), (usize, usize))| {
-                -dot(self.across_edge(a.0, *ends), self.across_edge(b.0, *ends))
-            };
+            let straightness =
+                |&(a, b): &(Side, Side)| -dot(self.across_edge(a.0, *ends), self.across_edge(b.0, *ends));
             let best = pairs.max_by(|a, b| straightness(a).total_cmp(&straightness(b)));
-            joints.extend(best.filter(|pair| straightness(pair) > SMOOTH).map(|pair| (*ends, pair)));
+            joints.extend(best.filter(|pair| straightness(pair) > SMOOTH));
         }
-        let turns = |((i, _), (j, _)): ((usize, usize), (usize, usize))| self.turns(i, j);
+        let joined: BTreeSet<Side> = joints.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let mut images = self.images(topology, &joined);
+        let turns = |(a, b): &(Side, Side)| self.turns(a.0, b.0);
+        let leans = |((i, _), plane): &(Side, Point)| dot(unit(self.faces[*i].area), *plane).abs() > FLAT;
+        let at_joints = joints.iter().filter(|pair| turns(pair)).map(|(a, _)| *a);
+        let at_images = images.iter().filter(|image| leans(image)).map(|(side, _)| *side);
         let turning: BTreeSet<NodeId> =
-            joints.iter().filter(|(_, pair)| turns(*pair)).flat_map(|(ends, _)| *ends).collect();
+            at_joints.chain(at_images).flat_map(|(i, k)| self.faces[i].edge(k)).collect();
         let is_curved = |i: usize| self.faces[i].nodes.iter().all(|n| turning.contains(n));
-        joints.retain(|(_, pair)| !turns(*pair) || is_curved(pair.0.0) || is_curved(pair.1.0));
-        for (_, ((i, k), (j, l))) in joints {
+        joints.retain(|pair| !turns(pair) || is_curved(pair.0.0) || is_curved(pair.1.0));
+        images.retain(|image| !leans(image) || is_curved(image.0.0));
+        for ((i, k), (j, l)) in joints {
             (self.faces[i].next[k], self.faces[j].next[l]) = (Some(j), Some(i));
         }
-        turning
+        for ((i, k), plane) in images {
+            self.faces[i].mirror[k] = Some(plane);
+        }
     }
 
-    /// Lets faces that end at an outer face of the mesh go on in their images, as in each other.
-    fn mirror(&mut self, topology: &Topology, turning: &BTreeSet<NodeId>) {
+    /// The sides of faces that end at an outer plane of the mesh, at no sharper an edge with their images there than faces have that
+    /// go on in each other; with the plane's normal.
+    fn images(&self, topology: &Topology, joined: &BTreeSet<Side>) -> Vec<(Side, Point)> {
         let mut outer: BTreeMap<[NodeId; 2], Vec<([NodeId; 3], Point)>> = BTreeMap::new();
+        let is_on_surface = |edge: &[NodeId; 2]| edge.iter().all(|n| self.around.contains_key(n));
         for facet in topology.facets().iter().filter(|facet| facet.outside.is_none()) {
             let area = area_vector(facet.nodes.map(|n| self.points[n.index()]));
-            for [a, b] in edges_of(facet.nodes) {
-                let known = self.around.contains_key(&a) && self.around.contains_key(&b) && norm(area) > 0.0;
-                if known {
-                    outer.entry(edge_key([a, b])).or_default().push((facet.nodes, unit(area)));
-                }
-            }
-        }
-        for face in &mut self.faces {
-            let normal = unit(face.area);
-            for (k, edge) in
-                edges_of(face.nodes).into_iter().enumerate().filter(|(k, _)| face.next[*k].is_none())
+            for edge in
+                triangle_edges(facet.nodes).into_iter().filter(|edge| norm(area) > 0.0 && is_on_surface(edge))
             {
-                let mut behind = outer.get(&edge_key(edge)).into_iter().flatten();
-                let Some((_, plane)) = behind.find(|(nodes, _)| *nodes != face.nodes) else { continue };
-                let lean = dot(normal, *plane).abs();
-                let off_edge = face.nodes[(k + 2) % 3];
-                // The image leans as much the other way.
-                if 1.0 - 2.0 * lean * lean > SMOOTH && (lean < FLAT || turning.contains(&off_edge)) {
-                    face.mirror[k] = Some(*plane);
-                }
+                outer.entry(edge).or_default().push((facet.nodes, unit(area)));
             }
         }
+        let image = |(i, k): Side| {
+            let face = &self.faces[i];
+            let behind = outer.get(&edge_key(face.edge(k)))?.iter().filter(|(nodes, _)| *nodes != face.nodes);
+            let mut planes = behind.map(|(_, plane)| *plane);
+            let plane = planes.next()?;
+            // A side that is curved mirrors nothing.
+            let is_plane = planes.all(|other| norm(cross(plane, other)) <= FLAT);
+            let lean = dot(unit(face.area), plane);
+            // The image leans as much the other way.
+            (is_plane && 1.0 - 2.0 * lean * lean > SMOOTH).then_some(((i, k), plane))
+        };
+        let sides = (0..self.faces.len()).flat_map(|i| (0..3).map(move |k| (i, k)));
+        sides.filter(|side| !joined.contains(side)).filter_map(image).collect()
     }
 
     /// The direction from an edge into a face, at right angles to the edge.
@@ -268,7 +272,7 @@ impl<'a> CurvedSurfaces<'a> {
         }
     }
 
-    /// Normal at a node of a surface that goes around it, with its images; `None` at a rim.
+    /// Normal at a node of a surface that goes around it, with its images; `None` at a rim and at a point.
     fn closed_normal(&self, node: NodeId, surface: &[Directed]) -> Option<Point> {
         let ends = surface.iter().flat_map(|&(i, _)| {
             let face = &self.faces[i];
@@ -282,7 +286,19 @@ impl<'a> CurvedSurfaces<'a> {
                 planes.push(unit(rest));
             }
         }
-        Some(unit(project_out(&planes, sum(surface.iter().map(|own| self.area_of(*own))))))
+        let normal = sum(surface.iter().map(|own| self.normal_in_corner(node, *own)));
+        let within = project_out(&planes, normal);
+        (norm(within) > SMOOTH * norm(normal)).then(|| unit(within))
+    }
+
+    /// The normal of a face by its angle [rad] at a node, which is that of a facet however it is divided into triangles.
+    fn normal_in_corner(&self, node: NodeId, own: Directed) -> Point {
+        let nodes = self.faces[own.0].nodes;
+        let at = nodes.iter().position(|n| *n == node).unwrap_or(0);
+        let [along, other] = [1, 2].map(|k| self.points[nodes[(at + k) % 3].index()]);
+        let [along, other] = [along, other].map(|end| sub(end, self.points[nodes[at].index()]));
+        let angle = norm(cross(along, other)).atan2(dot(along, other));
+        unit(self.area_of(own)).map(|c| angle * c)
     }
 
     /// Normal of a face's surface at a node.
@@ -378,13 +394,8 @@ struct RimFacet {
 impl Face {
     /// The edge from a node to the next one.
     fn edge(&self, k: usize) -> [NodeId; 2] {
-        edges_of(self.nodes)[k]
+        [self.nodes[k], self.nodes[(k + 1) % 3]]
     }
-}
-
-/// The edges of a triangle, from each node to the next one.
-fn edges_of(nodes: [NodeId; 3]) -> [[NodeId; 2]; 3] {
-    [0, 1, 2].map(|k| [nodes[k], nodes[(k + 1) % 3]])
 }
 
 /// The sum of vectors.

@@ -263,6 +263,20 @@ impl Topology {
         self.facets.iter().filter(outer).map(|f| f.nodes).collect()
     }
 
+    /// All faces of a region, oriented outwards, in the order of [`Topology::facets`].
+    pub fn boundary(&self, of: RegionId) -> Vec<[NodeId; 3]> {
+        let is_own = |e: ElementId| self.region_of[e.index()] == of;
+        let oriented = |f: &Facet| {
+            let [a, b, c] = f.nodes;
+            match (is_own(f.inside), f.outside.is_some_and(is_own)) {
+                (true, false) => Some([a, b, c]),
+                (false, true) => Some([a, c, b]),
+                _ => None,
+            }
+        };
+        self.facets.iter().filter_map(oriented).collect()
+    }
+
     /// The faces that a name `"a|b"` stands for: between the regions `a` and `b`, oriented out of `a`.
     ///
     /// `"a|outside"` are the faces of `a` at the outside of the mesh, unless a region has that name.

@@ -129,6 +129,18 @@ pub enum SolverError {
         place: [f64; 3],
         what: &'static str,
     },
+    /// A body on which a force is sought that touches the surface which stands for a conductor.
+    #[error(
+        "the body `{body}` touches the surface that stands for `{conductor}`, at {}: the force on it is taken in the elements around it, \
+         and what flows in that surface has none; leave a layer of air between the two, or mesh the conductor",
+        millimetres(*place)
+    )]
+    TouchesConductor {
+        body: String,
+        conductor: String,
+        /// Where [m].
+        place: [f64; 3],
+    },
     /// A body on which a force is sought, or the layer of elements around it, is in the shell of open space.
     #[error(
         "the force on `{body}` is taken in the layer of elements around it, and the body touches or holds the shell of open space, at \

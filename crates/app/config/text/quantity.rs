@@ -8,7 +8,6 @@ use std::fmt;
 use super::dimension::Dimension::{self, Conductivity};
 use super::dimension::UNITS;
 use super::message::shown;
-use super::nearest::nearest;
 
 /// Spellings of resistivity: common in material tables, and the reciprocal of what is needed.
 const RESISTIVITY: &[&str] =
@@ -59,12 +58,17 @@ pub fn parse_quantity(text: &str, dimension: Dimension) -> Result<f64, QuantityE
             ),
         });
     }
-    if let Some(fraction) =
-        unit_text.strip_prefix(',').filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
-    {
+    let behind_comma = unit_text.strip_prefix(',');
+    if let Some(fraction) = behind_comma.filter(|rest| rest.starts_with(|c: char| c.is_ascii_digit())) {
+        let digits = fraction.chars().take_while(char::is_ascii_digit).count();
+        // Three digits may be thousands.
+        let example = match digits != 3 && !number.written.contains('.') {
+            true => format!(": \"{}.{}\"", number.written, shown(fraction)),
+            false => String::new(),
+        };
         return Err(QuantityError {
-            message: format!("`{written}` has a decimal comma"),
-            help: format!("write a decimal point: \"{}.{}\"", number.written, shown(fraction)),
+            message: format!("`{written}` has a comma"),
+            help: format!("write a decimal point, and nothing between thousands{example}"),
         });
     }
     if dimension == Conductivity && RESISTIVITY.contains(&unit_text) {
@@ -103,30 +107,27 @@ pub(in crate::config) fn is_number_with_unit(text: &str) -> bool {
     number.is_some() && unit.starts_with(|c: char| c.is_alphabetic() || c == '\u{b0}')
 }
 
-/// The unit of a few that another text stands for, written otherwise: in other case, in full, with a sign for the power, as a plural,
-/// or with a wrong letter behind the first one. No other unit is offered however near: a letter more or less, one before it, and one
-/// of a part of it are powers of ten.
+/// The unit of a few that another text stands for, written otherwise: in other case, in full, with a sign for the power or as a
+/// plural. None is offered that differs in its prefix or in a letter: those are powers of ten.
 fn meant<'a>(text: &str, known: &[&'a str]) -> Option<&'a str> {
     let bare = text.replace(['^', '*', '.', ' '], "");
     let singular = bare.strip_suffix('s').unwrap_or(&bare);
-    let of_name = SPELLED_OUT
-        .iter()
-        .find(|(name, _)| [text, singular].iter().any(|own| own.eq_ignore_ascii_case(name)));
-    let is_prefix = |unit: &str, text: &str| unit.starts_with(['m', 'M']) && unit.get(1..) == text.get(1..);
     let written = [text, &bare, singular];
-    let by_case =
-        |unit: &&str| written.iter().any(|own| unit.eq_ignore_ascii_case(own) && !is_prefix(unit, own));
-    let known = |of: &dyn Fn(&&str) -> bool| known.iter().copied().find(|unit| of(unit));
-    let is_plain = |unit: &str| unit.chars().all(char::is_alphabetic);
-    let by_letter = |unit: &&str| {
-        let is_alike =
-            unit.chars().count() == text.chars().count() && unit.chars().next() == text.chars().next();
-        is_plain(text) && is_plain(unit) && is_alike && nearest(text, [*unit]).is_some()
+    let named = |own: &str| {
+        SPELLED_OUT.iter().find(|(name, _)| own.eq_ignore_ascii_case(name)).map(|(_, unit)| *unit)
     };
-    known(&by_case)
-        .or_else(|| known(&|unit| of_name.is_some_and(|(_, named)| named == unit)))
-        .or_else(|| known(&by_letter))
+    let has_other_prefix = |unit: &str, own: &str| {
+        let has_prefix = unit.len() > 1 && unit.starts_with(['m', 'M']) && !ALSO_UPPER_CASE.contains(&unit);
+        has_prefix && unit.get(..1) != own.get(..1)
+    };
+    let is_it = |unit: &str, own: &str| unit.eq_ignore_ascii_case(own) && !has_other_prefix(unit, own);
+    let of = |is: &dyn Fn(&str) -> bool| known.iter().copied().find(|unit| is(unit));
+    of(&|unit| written.iter().any(|own| is_it(unit, own)))
+        .or_else(|| of(&|unit| written.iter().any(|own| named(own) == Some(unit))))
 }
+
+/// Units with an m before them that have no relative with an M.
+const ALSO_UPPER_CASE: [&str; 2] = ["mm", "min"];
 
 /// Units by their full names.
 const SPELLED_OUT: &[(&str, &str)] = &[
@@ -256,7 +257,10 @@ mod tests {
             ("10 MM", Length, "did you mean \"10 mm\"?"),
             ("5 MT", FluxDensity, "not a unit of flux density; write it like"),
             ("1e3 millimetres", Length, "did you mean \"1e3 mm\"?"),
-            ("20 mn", Length, "did you mean \"20 mm\"?"),
+            ("1 MOhm", Resistance, "not a unit of resistance; write it like"),
+            ("5 Mhz", Frequency, "not a unit of frequency; write it like"),
+            ("4 Ma", Current, "not a unit of current; write it like"),
+            ("3 mi", Length, "not a unit of length; write it like"),
             ("22 cm^3", Volume, "did you mean \"22 cm3\"?"),
             ("7.85 g/cm^3", MassDensity, "did you mean \"7.85 g/cm3\"?"),
             ("5 Ohms", Resistance, "did you mean \"5 ohm\"?"),
@@ -268,7 +272,12 @@ mod tests {
             ("10", Length, "write its unit behind it, like \"10 mm\""),
             ("1.4e-7 Ohm m", Conductivity, "is a resistivity"),
             ("0 Ohm m", Conductivity, "is a resistivity"),
-            ("0,8 mm", Length, "write a decimal point: \"0.8 mm\""),
+            ("0,8 mm", Length, "nothing between thousands: \"0.8 mm\""),
+            (
+                "1,000 mm",
+                Length,
+                "`1,000 mm` has a comma; write a decimal point, and nothing between thousands",
+            ),
             ("1e400 m", Length, "too large"),
             ("1e99999999999 m", Length, "too large"),
             ("10 parsec", Length, "accepted units: m, cm, mm"),

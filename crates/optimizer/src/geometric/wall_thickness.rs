@@ -63,14 +63,14 @@ pub struct Wall {
 /// The opposite face behind every design node.
 #[derive(Clone, Debug)]
 pub struct WallThickness {
-    /// `None` where the node has no direction, or its ray leads past the body at a rim.
+    /// `None` where the node has no direction, or its ray leads past the body or through its side at a rim.
     opposite: Vec<Option<Opposite>>,
 }
 
 impl WallThickness {
     /// Measures the bodies of the undeformed mesh, each behind its own part of the design surface; `None` where some ray does not meet
     /// an opposite face of its body. Only at the rim of the design surface it may: where the body ends beside it, a direction that leans
-    /// outwards by as little as facets of a round face do leads past the body, and the node has no thickness.
+    /// outwards by as little as facets of a round face do leads past the body or out through its side, and the node has no thickness.
     pub fn measure(mesh: &Mesh, bodies: &[RegionId], surface: &DesignSurface) -> Option<Self> {
         let of: BTreeMap<RegionId, BodyFaces> =
             bodies.iter().map(|&region| (region, BodyFaces::new(mesh, region, surface))).collect();
@@ -91,8 +91,8 @@ impl WallThickness {
             let in_body = |body: RegionId| {
                 let faces = &of[&body];
                 // Along the facets of a side that is round a ray from the rim meets one of them anywhere.
-                let beside = || faces.beside(origin, back).filter(|_| !faces.are_at_rim(node));
-                let (hit, nodes) = faces.opposite(origin, back).or_else(beside)?;
+                let grazing = || faces.grazed(origin, back).filter(|_| !faces.are_at_rim(node));
+                let (hit, nodes) = faces.opposite(origin, back).or_else(grazing)?;
                 Some(Some(Opposite::new(&hit, *direction, (nodes, body))))
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
@@ -217,14 +217,7 @@ struct BodyFaces {
 
 impl BodyFaces {
     fn new(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Self {
-        let topology = mesh.topology();
-        let is_own = |e: ElementId| topology.region_of()[e.index()] == region;
-        let own = topology.facets().iter().filter(|f| is_own(f.inside) != f.outside.is_some_and(is_own));
-        let outwards = |facet: &Facet| match facet.nodes {
-            nodes if is_own(facet.inside) => nodes,
-            [a, b, c] => [a, c, b],
-        };
-        let nodes: Vec<[NodeId; 3]> = own.map(outwards).collect();
+        let nodes = mesh.topology().boundary(region);
         let is_designed = |face: &&[NodeId; 3]| face.iter().all(|n| surface.nodes().binary_search(n).is_ok());
         let (designed, others): (Vec<_>, Vec<_>) = nodes.iter().partition(is_designed);
         let [designed_nodes, other_nodes] =
@@ -254,7 +247,7 @@ impl BodyFaces {
     }
 
     /// The nearest face that a ray meets, which may run along it: with the distance to its point.
-    fn beside(&self, origin: Point, direction: Point) -> Option<(Hit, [NodeId; 3])> {
+    fn grazed(&self, origin: Point, direction: Point) -> Option<(Hit, [NodeId; 3])> {
         let (hit, nodes) = self.nearest(origin, direction, |_| true)?;
         Some((Hit { normal: direction, ..hit }, nodes))
     }

@@ -331,6 +331,12 @@ mod tests {
                 let cut = fault(Condition::Open, 0, 0.0);
                 assert!(matches!(cut, Some(PlaneFault::Crossing { .. })), "{width} {height}: {cut:?}");
                 assert_eq!(fault(Condition::Open, 2, 0.0), None);
+                // In its middle the current runs along the plane, and crosses it beside that.
+                let tangent = fault(Condition::Open, 0, 0.203 + 0.5 * width);
+                assert!(
+                    matches!(tangent, Some(PlaneFault::Crossing { .. })),
+                    "{width} {height}: {tangent:?}"
+                );
                 assert_eq!(fault(Condition::FluxParallel, 2, 0.5 * height), None);
                 let lengthwise = fault(Condition::FluxParallel, 2, 0.49 * height);
                 assert!(

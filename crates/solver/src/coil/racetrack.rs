@@ -41,6 +41,9 @@ pub struct Racetrack {
 /// surface does not cut it, whatever the rounding of its nodes.
 const SKIN: f64 = 1e-6;
 
+/// Cosine of six degrees.
+const STRAIGHT_ON: f64 = 0.994_522;
+
 /// In so many pieces goes a straight side of [`Racetrack::edges`].
 const STRAIGHT: usize = 8;
 
@@ -158,8 +161,9 @@ impl Racetrack {
         })
     }
 
-    /// Whether one point of a triangle stands for all of it, which lies in the window, in the winding or beyond both. The distance
-    /// outwards is convex: nowhere more than at one of the vertices, nor less than its tangent says.
+    /// Whether one point of a triangle stands for all of it: it lies in the window, beyond the coil, or in the winding where the current
+    /// turns by less than six degrees. The distance outwards is convex: nowhere more than at one of the vertices, nor less than its
+    /// tangent says.
     pub(super) fn is_alike_in(&self, vertices: &[Point; 3]) -> bool {
         let local = vertices.map(|x| self.frame.local(x));
         let middle = centroid(local);
@@ -172,7 +176,10 @@ impl Racetrack {
         let [lower, upper] = span(local.map(|x| 2.0 * x[2] / self.height));
         let is_beyond = nearest >= (1.0 - SKIN) * self.width || lower >= 1.0 - SKIN || upper <= SKIN - 1.0;
         let is_between_ends = lower >= -1.0 - SKIN && upper <= 1.0 + SKIN;
-        let is_one_part = farthest <= SKIN * self.width || (nearest >= 0.0 && farthest <= self.width);
+        let is_straight =
+            || local.iter().map(|x| self.outwards(*x)).all(|[a, b]| a * p + b * q > STRAIGHT_ON);
+        let is_one_part =
+            farthest <= SKIN * self.width || (nearest >= 0.0 && farthest <= self.width && is_straight());
         is_beyond || is_between_ends && is_one_part
     }
 

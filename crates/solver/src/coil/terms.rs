@@ -33,12 +33,10 @@ impl SourceTerms {
             match &coil.shape {
                 CoilShape::Racetrack(racetrack) => {
                     let moments = moments(racetrack, mesh);
-                    let is_wound = |(e, _): &(ElementId, _)| {
-                        let vertices = mesh.vertices(*e);
-                        !racetrack.encloses(&vertices) && racetrack.wound_place(vertices).is_some()
-                    };
+                    let (in_window, met): (Vec<_>, Vec<_>) =
+                        moments.iter().map(|(e, _)| *e).partition(|&e| racetrack.encloses(&mesh.vertices(e)));
                     // A mesh that lies in the window alone has no current.
-                    if !moments.iter().any(is_wound) {
+                    if !met.iter().any(|&e| racetrack.wound_place(mesh.vertices(e)).is_some()) {
                         return Err(SolverError::NoSource {
                             coil: coil.name.clone(),
                             cause: format!(
@@ -48,14 +46,9 @@ impl SourceTerms {
                         });
                     }
                     let potential = times(&racetrack.axis().map(|e| racetrack.plateau() * e));
-                    for (e, moment) in moments {
-                        if racetrack.encloses(&mesh.vertices(e)) {
-                            windows.push((e, [potential]));
-                        } else {
-                            cut.push(e);
-                        }
-                        all.push((e, moment.each_ref().map(times)));
-                    }
+                    windows.extend(in_window.into_iter().map(|e| (e, [potential])));
+                    cut.extend(met);
+                    all.extend(moments.into_iter().map(|(e, moment)| (e, moment.each_ref().map(times))));
                 }
                 shape => {
                     let Some(current) = shape.region_current() else { continue };

@@ -76,7 +76,7 @@ impl Force {
     ///
     /// # Errors
     /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not
-    /// free, [`SolverError::ForceInShell`] where they or the body are in the shell of open space.
+    /// free, [`SolverError::TouchesConductor`] where they end at the surface of one, [`SolverError::ForceInShell`] where they or the body are in the shell of open space.
     pub fn new(
         model: &FieldModel,
         mesh: &Mesh,
@@ -129,11 +129,10 @@ impl Force {
             model.conductors().iter().flat_map(|own| own.surface.iter().map(move |face| (own, *face)));
         for (conductor, face) in faces {
             if face.iter().any(|node| body.contains_key(node)) {
-                return Err(SolverError::Layer {
+                return Err(SolverError::TouchesConductor {
                     body: name.to_owned(),
-                    region: conductor.name.clone(),
+                    conductor: conductor.name.clone(),
                     place: centroid(face.map(|node| mesh.point(node))),
-                    what: "the surface of a conductor",
                 });
             }
         }

@@ -13,7 +13,6 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, Tet4, cross, dot, sub};
-use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, tet4};
 
 use super::FunctionalValue;
@@ -123,20 +122,10 @@ impl Volume {
 }
 
 impl Extent {
-    /// What the faces of a region of `full` enclose, whose nodes at the places of nodes of `reference` are these; `None`
-    /// without faces.
+    /// What the faces of a region of `full` enclose. Corners that are nodes of `reference`, by their coordinates, move; the others
+    /// stay. `None` without faces.
     fn enclosed(reference: &Mesh, full: &Mesh, region: RegionId) -> Option<Self> {
-        let topology = full.topology();
-        let is_own = |e: ElementId| topology.region_of()[e.index()] == region;
-        let out = |facet: &Facet| match (is_own(facet.inside), facet.outside.is_some_and(is_own)) {
-            (true, false) => Some(facet.nodes),
-            (false, true) => {
-                let [a, b, c] = facet.nodes;
-                Some([a, c, b])
-            }
-            _ => None,
-        };
-        let faces: Vec<[NodeId; 3]> = topology.facets().iter().filter_map(out).collect();
+        let faces = full.topology().boundary(region);
         let key = |point: Point| point.map(f64::to_bits);
         let mut moving: BTreeMap<_, Option<NodeId>> =
             faces.iter().flatten().map(|&n| (key(full.point(n)), None)).collect();
@@ -163,6 +152,7 @@ impl Corner {
         }
     }
 }
+
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
