@@ -2,9 +2,9 @@
 //!
 //! A surface is taken from its facets alone: with its normals `n` at the ends of an edge `e`, its middle lies `s = (n_b − n_a)·e/8`
 //! over the edge, exactly so of a circle (`L²/(8R)`). Over a triangle with its nodes on the surface this is a quadratic function,
-//! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around by their angles there, and of their images in the
-//! outer faces of the mesh that end them, so that a part of a device has the surfaces of the whole; where there are faces on one
-//! side only, it goes on as from the faces behind to them.
+//! whose mean is a third of the sum over its edges. The normal at a node is that of the faces around by their angles there, and of
+//! their images in the outer planes of the mesh that end them, so that a part of a device has the surfaces of the whole; where there
+//! are faces on one side only, it goes on as from the faces behind to them.
 //!
 //! Facets go on in each other where they meet at less than 42°, whatever the regions behind them, and where one of them has
 //! turns at all of its nodes: an edge between two planes with nodes of their own is an edge.
