@@ -259,7 +259,7 @@ mod tests {
             ("1e3 millimetres", Length, "did you mean \"1e3 mm\"?"),
             ("1 MOhm", Resistance, "not a unit of resistance; write it like"),
             ("5 Mhz", Frequency, "did you mean \"5 MHz\"?"),
-            ("4 Ma", Current, "not a unit of current; write it like"),
+            ("4 Ma", Current, "did you mean \"4 MA\"?"),
             ("3 mi", Length, "not a unit of length; write it like"),
             ("22 cm^3", Volume, "did you mean \"22 cm3\"?"),
             ("7.85 g/cm^3", MassDensity, "did you mean \"7.85 g/cm3\"?"),
