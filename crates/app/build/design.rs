@@ -9,7 +9,6 @@ use fluxmorph_optimizer::design::{
     default_filter_radius, edges_without_image,
 };
 
-use super::outline::same_nodes;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
 
@@ -123,7 +122,7 @@ pub(super) fn on_remaining(
     full_mesh: &Mesh,
     mesh: &Mesh,
 ) -> Result<DesignSurface, Error> {
-    let same = same_nodes(full_mesh, mesh);
+    let same = full_mesh.nodes_in(mesh);
     let nodes: Vec<NodeId> = surface.nodes().iter().filter_map(|n| same[n.index()]).collect();
     if nodes.len() == surface.nodes().len() {
         return Ok(surface.renumbered(nodes));

@@ -2,7 +2,7 @@
 //!
 //! No matrix is made and no elastic body factored, so that a large mesh costs no more than being read or generated.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
@@ -74,7 +74,7 @@ pub fn outline(
         full_mesh = refined.mesh().clone();
     }
     let (mesh, _) = field::without_replaced_regions(config, &full_mesh)?;
-    let node_of = same_nodes(&full_mesh, &mesh);
+    let node_of = full_mesh.nodes_in(&mesh);
     let design = match &config.design {
         Some(_) => Some(outline_design((config, source), carried, &full_mesh, &mesh, &node_of)?),
         None => None,
@@ -82,16 +82,6 @@ pub fn outline(
     // Iron of which the table is gone has no audit.
     let audits = audits(config, &full_mesh, &Curves::read(config, source).unwrap_or_default());
     Ok(Outline { full_mesh, mesh, node_of, audits, design })
-}
-
-/// Nodes keep their places, bit by bit, where others are taken out.
-pub(super) fn same_nodes(full_mesh: &Mesh, mesh: &Mesh) -> Vec<Option<NodeId>> {
-    let key = |point: [f64; 3]| point.map(f64::to_bits);
-    if full_mesh.points().len() == mesh.points().len() {
-        return mesh.topology().nodes().map(Some).collect();
-    }
-    let kept: BTreeMap<_, NodeId> = mesh.topology().nodes().map(|n| (key(mesh.point(n)), n)).collect();
-    full_mesh.points().iter().map(|&point| kept.get(&key(point)).copied()).collect()
 }
 
 fn outline_design(

@@ -16,7 +16,6 @@ use fluxmorph_solver::FieldModel;
 use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
 use super::entries::{is_air, material};
 use super::functional::FixedElements;
-use super::outline::same_nodes;
 use super::plausible;
 use super::soundness::unit_warning;
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
@@ -276,7 +275,7 @@ pub(super) fn shape(
     }
     let bodies = thickened_regions(full_mesh, &full_surface, config);
     let thickness = WallThickness::measure(full_mesh, &bodies, &full_surface)
-        .and_then(|thickness| thickness.renumbered(&same_nodes(full_mesh, mesh)));
+        .and_then(|thickness| thickness.renumbered(&full_mesh.nodes_in(mesh)));
     let n = surface.variable_count();
     let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
         let fault = source.diagnostic("design.initial", format!("design.initial has not {n} values"));

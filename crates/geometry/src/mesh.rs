@@ -1,5 +1,6 @@
 //! A topology with coordinates: the only thing that moves.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -100,6 +101,18 @@ impl Mesh {
             }
         }
         limits
+    }
+
+    /// The node of another mesh at the place of each node of this one, to the bit; `None` where it has none. Of as many nodes it is the
+    /// same one.
+    pub fn nodes_in(&self, other: &Self) -> Vec<Option<NodeId>> {
+        if self.points.len() == other.points.len() {
+            return other.topology.nodes().map(Some).collect();
+        }
+        let key = |point: Point| point.map(f64::to_bits);
+        let there: BTreeMap<_, NodeId> =
+            other.topology.nodes().map(|node| (key(other.point(node)), node)).collect();
+        self.points.iter().map(|&point| there.get(&key(point)).copied()).collect()
     }
 
     /// The mesh without one region, and the faces that its removal exposed (see [`Topology::without_region`]).

@@ -67,14 +67,9 @@ fn direct_loss_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
 
 /// Ratios to losses of coils whose wire has none.
 pub(in crate::build) fn warnings(config: &Config) -> Vec<String> {
-    let without_loss = |name: &&String| {
-        let is_it = |own: &&config::Coil| own.name == **name;
-        config
-            .coils
-            .iter()
-            .find(is_it)
-            .is_some_and(|own| !own.is_solid() && own.resistance.unwrap_or(0.0) == 0.0)
-    };
+    let is_lossless = |own: &config::Coil| !own.is_solid() && own.resistance.unwrap_or(0.0) == 0.0;
+    let lossless: Vec<&String> =
+        config.coils.iter().filter(|own| is_lossless(own)).map(|own| &own.name).collect();
     let mut warnings = Vec::new();
     for (path, own) in functionals(config) {
         let what = match own.kind {
@@ -82,7 +77,7 @@ pub(in crate::build) fn warnings(config: &Config) -> Vec<String> {
             ObjectiveKind::LinkEfficiency => "link efficiency",
             _ => continue,
         };
-        for name in own.coils.iter().flatten().filter(without_loss) {
+        for name in own.coils.iter().flatten().filter(|name| lossless.contains(name)) {
             warnings.push(format!(
                 "{path}: the coil `{name}` has no resistance, so that the {what} counts losses outside of its winding alone, and \
                  without these has no bound; `resistance` of its [[coils]] is that of its wire"

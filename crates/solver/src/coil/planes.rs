@@ -177,12 +177,12 @@ fn places(coil: &Racetrack, vertices: [Point; 3]) -> Vec<Point> {
     let mut places = Vec::new();
     let mut parts = vec![vertices];
     while let Some(part) = parts.pop() {
-        let middles = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| add(part[i], part[j]).map(|c| 0.5 * c));
         let longest = (0..3).map(|k| norm(sub(part[k], part[(k + 1) % 3]))).fold(0.0, f64::max);
         if longest <= smallest || coil.is_alike_in(&part) {
             places.push(centroid(part));
         } else {
-            let ([a, b, c], [ab, bc, ca]) = (part, middles);
+            let [a, b, c] = part;
+            let [ab, bc, ca] = [[a, b], [b, c], [c, a]].map(|[p, q]| add(p, q).map(|x| 0.5 * x));
             let quarters = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]];
             parts.extend(quarters.into_iter().filter(|quarter| near(coil, quarter)));
         }

@@ -10,8 +10,6 @@
 //! whatever becomes of the triangles there: in a plane only the rim counts. Both sums run in the order of the elements or
 //! triangles, whatever the number of threads.
 
-use std::collections::BTreeMap;
-
 use fluxmorph_geometry::tet4::{Point, Tet4, cross, dot, sub};
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, tet4};
 
@@ -126,18 +124,8 @@ impl Extent {
     /// stay. `None` without faces.
     fn enclosed(reference: &Mesh, full: &Mesh, region: RegionId) -> Option<Self> {
         let faces = full.topology().boundary(region);
-        let key = |point: Point| point.map(f64::to_bits);
-        let mut moving: BTreeMap<_, Option<NodeId>> =
-            faces.iter().flatten().map(|&n| (key(full.point(n)), None)).collect();
-        for node in reference.topology().nodes() {
-            if let Some(own) = moving.get_mut(&key(reference.point(node))) {
-                *own = Some(node);
-            }
-        }
-        let corner = |n: NodeId| match moving[&key(full.point(n))] {
-            Some(node) => Corner::Node(node),
-            None => Corner::Still(full.point(n)),
-        };
+        let moving = full.nodes_in(reference);
+        let corner = |n: NodeId| moving[n.index()].map_or_else(|| Corner::Still(full.point(n)), Corner::Node);
         let origin = full.point(faces.first()?[0]);
         Some(Self::Enclosed { faces: faces.iter().map(|face| face.map(corner)).collect(), origin })
     }
