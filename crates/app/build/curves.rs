@@ -146,6 +146,7 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
     };
     let whole = |message: String| refused(String::new(), message);
     let bytes = read_at_most(path, LARGEST_FILE).map_err(|error| match error.kind() {
+        ErrorKind::NotFound => Box::new(source.no_file(&format!("materials.{name}.bh_file"), path)),
         ErrorKind::FileTooLarge => {
             whole(format!("it has more than {LARGEST_FILE} bytes, and a curve takes some hundred points"))
         }

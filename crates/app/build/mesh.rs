@@ -4,6 +4,7 @@
 //! the mesh under that name before anything else looks for it, so that every key may use it.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -96,6 +97,9 @@ fn parameter_fault(error: MeshError, source: &SourceMap) -> Error {
 fn file_fault(error: MeshError, source: &SourceMap) -> Error {
     match error {
         MeshError::Msh { path, cause } => msh_fault(&path, &cause, source).into(),
+        MeshError::File { path, cause } if cause.kind() == ErrorKind::NotFound => {
+            source.error(vec![source.no_file("mesh.file", &path)]).into()
+        }
         MeshError::File { path, cause } => OutputError::io("read mesh.file", path)(cause).into(),
         other => other.into(),
     }

@@ -149,12 +149,19 @@ struct Session<'a> {
     directory: RunDirectory,
     manifest: Manifest,
     clock: Instant,
+    /// What the evaluations took that a resumed run has from its journal [s].
+    replayed_seconds: f64,
     setup_seconds: f64,
     interrupted: &'a dyn Fn() -> bool,
     searched: &'a dyn Fn(&RunDirectory) -> Option<PathBuf>,
 }
 
 impl Session<'_> {
+    /// Time of the run until now, with the evaluations of earlier sessions [s].
+    fn seconds(&self) -> f64 {
+        self.replayed_seconds + self.clock.elapsed().as_secs_f64()
+    }
+
     /// Reports what is set up.
     fn announce(&self, observer: &mut dyn RunObserver) {
         let Self { command, config, setup, directory, .. } = self;
@@ -320,7 +327,7 @@ impl Session<'_> {
             Ok(Err(Error::Optimizer(OptimizerError::InterruptedRun))) => RunStatus::Interrupted,
             _ => RunStatus::Failed,
         };
-        self.manifest.complete(status, self.clock.elapsed().as_secs_f64());
+        self.manifest.complete(status, self.seconds());
         let completed = self.manifest.write(&self.directory);
         let outcome = outcome.unwrap_or_else(|panic| resume_unwind(panic));
         if let Err(error) = &outcome
@@ -429,7 +436,7 @@ impl Session<'_> {
         }
         let seconds = clock.elapsed().as_secs_f64();
         result.timings_s.insert("verification".to_owned(), seconds);
-        result.timings_s.insert("total".to_owned(), self.clock.elapsed().as_secs_f64());
+        result.timings_s.insert("total".to_owned(), self.seconds());
         result.peak_memory_bytes = peak_memory_bytes();
         Ok(result)
     }

@@ -92,6 +92,7 @@ impl<'a> Prepared<'a> {
             directory,
             manifest,
             clock,
+            replayed_seconds: 0.0,
             setup_seconds,
             interrupted: options.interrupted,
             searched: options.searched,

@@ -122,6 +122,7 @@ pub(crate) fn resume_held(
             (Journal::create(&directory, session.identity())?, Vec::new())
         }
     };
+    session.replayed_seconds = records.iter().map(|record| record.row.seconds).sum();
     let recorder = DirectoryRecorder::new(&session, journal, records)?;
     session.manifest.write(&directory)?;
     session.conclude(observer, |session, observer| session.optimise(recorder, observer))

@@ -142,7 +142,7 @@ impl Session<'_> {
     fn timings_result(&self, timings: &Timings, terminals: f64) -> BTreeMap<String, f64> {
         BTreeMap::from(
             [
-                ("total", self.clock.elapsed().as_secs_f64()),
+                ("total", self.seconds()),
                 ("setup", self.setup_seconds),
                 ("remesh", timings.remesh),
                 ("assembly", timings.assembly),

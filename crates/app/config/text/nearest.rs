@@ -7,7 +7,7 @@ use strsim::{jaro_winkler, osa_distance};
 const LONGEST_COMPARED: usize = 256;
 
 /// Most names that are compared: a hostile mesh may have as many as it has bytes.
-const MOST_COMPARED: usize = 4000;
+pub(super) const MOST_COMPARED: usize = 4000;
 
 /// The candidate that `name` was probably meant to be, if one is near enough.
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {

@@ -4,12 +4,14 @@
 //! so that such a fault points at its key like every other.
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::diagnostic::{Diagnostic, Span, suggest};
 use super::document::Document;
 use super::message::shown;
+use super::nearest::{MOST_COMPARED, offer};
 use super::tree::{self, Table};
 use super::written_paths::WrittenPaths;
 
@@ -113,5 +115,17 @@ impl SourceMap {
     pub fn unknown_name(&self, path: &str, what: &str, name: &str, known: &[&str]) -> Diagnostic {
         let diagnostic = self.diagnostic(path, format!("there is no {what} `{}`", shown(name)));
         suggest(diagnostic, name, known)
+    }
+
+    /// A fault about a file that does not exist: suggests the nearest of its folder.
+    pub fn no_file(&self, path: &str, file: &Path) -> Diagnostic {
+        let folder = file.parent().and_then(|folder| fs::read_dir(folder).ok());
+        let names = folder.into_iter().flatten().flatten().map(|entry| entry.file_name());
+        let mut names: Vec<String> =
+            names.filter_map(|name| name.into_string().ok()).take(MOST_COMPARED).collect();
+        names.sort();
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let help = offer(&name, names.iter().map(String::as_str));
+        Diagnostic { help, ..self.diagnostic(path, format!("there is no file `{}`", file.display())) }
     }
 }
