@@ -112,6 +112,38 @@ fn surfaces_of_bodies_are_written_out_of_them() {
     assert!(stl[84..].chunks(50).all(|triangle| component(triangle, 2) < -0.99));
 }
 
+/// Every plane of symmetry is oblique then, and the air beside the plate slides in two of them.
+#[test]
+fn a_device_that_is_turned_has_the_same_optimum() {
+    let home = folder();
+    let config = device(home.path());
+    let racetrack = "shape = \"racetrack\"";
+    let mitred =
+        "half_window = [\"60 mm\", \"160 mm\"]\nwidth = \"20 mm\"\nheight = \"40 mm\"\ncorner = \"mitred\"";
+    edit(&config, mitred, "radius = \"60 mm\"\nwidth = \"20 mm\"\nheight = \"40 mm\"");
+    edit(&config, racetrack, "shape = \"circular\"");
+    edit(&config, "grid = [7, 13]\n", "");
+    edit(&config, "stiffness", "motion = \"free\"\nlaw = \"linear\"\nstiffness");
+    let optimum = |angle: f64| {
+        let (sine, cosine) = angle.to_radians().sin_cos();
+        let turn = |&[x, y, z]: &[f64; 3]| [cosine * x - sine * y, sine * x + cosine * y, z];
+        let mesh = generated();
+        let mesh = Mesh::new(Arc::clone(mesh.topology()), mesh.points().iter().map(turn).collect());
+        let bytes = msh_bytes(&mesh.expect("the same elements"), 1e-3, MshEncoding::Ascii).expect("finite");
+        fs::write(home.path().join("device.msh"), bytes).expect("written");
+        let out = home.path().join("out");
+        let further = ["--force", "--max-evaluations", "3", "--set", "output.fields=none"];
+        finish(command(&[&"run", &config, &"--out", &out]).args(further)).exits_with(1);
+        let result = RunFolder(out).result();
+        (number(&result, "/objective/initial"), number(&result, "/objective/ratio"))
+    };
+    let (initial, ratio) = optimum(0.0);
+    let (other_initial, other_ratio) = optimum(30.0);
+    assert!(ratio < 0.9, "{ratio}");
+    assert!((other_initial / initial - 1.0).abs() < 1e-8, "{initial} {other_initial}");
+    assert!((other_ratio / ratio - 1.0).abs() < 1e-6, "{ratio} {other_ratio}");
+}
+
 #[test]
 fn the_optimum_reads_back_as_the_mesh_of_the_result() {
     let home = folder();

@@ -16,7 +16,7 @@ use crate::error::Error;
 use crate::files::blake3_hex;
 
 /// Largest table that is read [bytes]: a thousand times the longest one that was ever measured.
-const LARGEST_FILE: u64 = 1024 * 1024;
+pub(crate) const LARGEST_TABLE: u64 = 1024 * 1024;
 
 /// Largest saturation polarisation [T]: four times that of iron and cobalt. More is another unit.
 const LARGEST_POLARISATION: f64 = 10.0;
@@ -145,10 +145,10 @@ fn filed(name: &str, path: &Path, source: &SourceMap) -> Result<(BhCurve, String
         Box::new(source.diagnostic(&key, message).expected(expected))
     };
     let whole = |message: String| refused(String::new(), message);
-    let bytes = read_at_most(path, LARGEST_FILE).map_err(|error| match error.kind() {
+    let bytes = read_at_most(path, LARGEST_TABLE).map_err(|error| match error.kind() {
         ErrorKind::NotFound => Box::new(source.no_file(&format!("materials.{name}.bh_file"), path)),
         ErrorKind::FileTooLarge => {
-            whole(format!("it has more than {LARGEST_FILE} bytes, and a curve takes some hundred points"))
+            whole(format!("it has more than {LARGEST_TABLE} bytes, and a curve takes some hundred points"))
         }
         _ => whole(error.to_string()),
     })?;

@@ -9,6 +9,7 @@ use fluxmorph_optimizer::design::{
     default_filter_radius, edges_without_image,
 };
 
+use super::held::sides;
 use crate::config::{self, Config, DesignDirection, DirectionWord, RimMotion, SourceMap};
 use crate::error::Error;
 
@@ -41,6 +42,10 @@ pub(super) fn surface(
         kept.extend(topology.surface(name)?.iter().copied().filter(|t| !own.contains(&face_key(*t))));
     }
     let outer = |t: &[NodeId; 3]| facets.get(&face_key(*t)).is_some_and(|facet| facet.outside.is_none());
+    let cuts = kept.iter().copied().filter(outer).collect();
+    let nodes: BTreeSet<NodeId> = triangles.iter().flatten().copied().collect();
+    let sides = sides(mesh, |node| nodes.contains(&node)).into_iter().map(|(triangle, _)| triangle);
+    kept.extend(sides.filter(|t| !own.contains(&face_key(*t))));
     let setup = DesignSetup {
         direction: match design.direction {
             DesignDirection::Vector(direction) => Direction::Along(direction),
@@ -57,7 +62,7 @@ pub(super) fn surface(
             RimMotion::Free => BoundaryMotion::Free,
             RimMotion::Fixed => BoundaryMotion::Fixed,
         },
-        cuts: kept.iter().copied().filter(outer).collect(),
+        cuts,
         triangles,
         kept,
     };

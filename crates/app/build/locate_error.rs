@@ -227,7 +227,7 @@ impl Blame<'_> {
         };
         match error {
             RemeshError::EmptyRegion | RemeshError::DesignNodeOutside { .. } => self.at(extent, error),
-            RemeshError::SurfaceElsewhere { surface, .. } | RemeshError::SlideNormal { surface, .. } => {
+            RemeshError::SurfaceElsewhere { surface, .. } | RemeshError::SlideCurved { surface, .. } => {
                 self.at(&self.surface("remesh", surface)?, error)
             }
             RemeshError::Unrestrained { .. } => self.at("remesh", error),

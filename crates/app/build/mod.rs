@@ -14,6 +14,7 @@ mod entries;
 mod field;
 mod forces;
 mod functional;
+mod held;
 mod loads;
 pub(crate) mod locate_error;
 pub(crate) mod memory_limit;
@@ -36,6 +37,7 @@ mod thickness;
 mod thin_windings;
 mod truncation;
 
+pub(crate) use curves::LARGEST_TABLE;
 pub(crate) use design::{out_of_body, triangulation as design_triangulation};
 pub(crate) use divided_mesh::DividedMesh;
 pub(crate) use elastic_body::{motion_in_words, stiffness_policy};

@@ -96,23 +96,15 @@ fn expansion(set: &MultipoleSet) -> Result<Expansion, Error> {
 pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) -> Result<(), Error> {
     let (mesh, states) = (problem.original(), problem.states());
     let mut sink = DiagnosticSink::new(config, source, Vec::new());
-    let bounds = AxisBox::around(&mesh.bounding_box());
     for (k, set) in config.multipoles.iter().enumerate() {
-        let planes = planes(config, set, mesh)?;
-        let disturbed = Multipoles::disturbance(states, mesh, &expansion(set)?, &planes);
-        // Beyond the box of the mesh it is no hole.
-        let Some((place, what)) = disturbed.filter(|(place, _)| bounds.contains(*place)) else {
+        let Some((message, what)) = disturbance(config, set, problem, mesh)? else {
             sink.take(multipoles(config, set, mesh, &states[0]))?;
             continue;
         };
-        let (shape, expected) = match set.shape {
-            ExpansionShape::Circle => ("circle", "a circle in air, on which B is that of sources beside it"),
-            ExpansionShape::Ball => {
-                ("ball", "air alone in it: only there is B a sum of the terms of sources outside")
-            }
+        let expected = match set.shape {
+            ExpansionShape::Circle => "a circle in air, on which B is that of sources beside it",
+            ExpansionShape::Ball => "air alone in it: only there is B a sum of the terms of sources outside",
         };
-        let place = millimetres(place);
-        let message = format!("the {shape} of the expansion `{}` holds {what}, at {place}", set.name);
         let fault = source.diagnostic(&format!("multipoles[{k}].radius"), message);
         let help = match what {
             Multipoles::NOWHERE => {
@@ -124,6 +116,36 @@ pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) 
         sink.push(fault.expected(expected).help(help));
     }
     sink.check()
+}
+
+/// Matter in an expansion, in words, and what it is.
+fn disturbance(
+    config: &Config,
+    set: &MultipoleSet,
+    problem: &Problem,
+    mesh: &Mesh,
+) -> Result<Option<(String, &'static str)>, Error> {
+    let planes = planes(config, set, mesh)?;
+    let bounds = AxisBox::around(&mesh.bounding_box());
+    let disturbed = Multipoles::disturbance(problem.states(), mesh, &expansion(set)?, &planes);
+    // Beyond the box of the mesh it is no hole.
+    Ok(disturbed.filter(|(place, _)| bounds.contains(*place)).map(|(place, what)| {
+        let shape = match set.shape {
+            ExpansionShape::Circle => "circle",
+            ExpansionShape::Ball => "ball",
+        };
+        let place = millimetres(place);
+        (format!("the {shape} of the expansion `{}` holds {what}, at {place}", set.name), what)
+    }))
+}
+
+/// The expansions into which a design, on its mesh, has brought matter.
+pub(crate) fn warnings(config: &Config, problem: &Problem, mesh: &Mesh) -> Result<Vec<String>, Error> {
+    let of = |set| Ok(disturbance(config, set, problem, mesh)?.map(|(message, _)| message));
+    let found: Result<Vec<Option<String>>, Error> = config.multipoles.iter().map(of).collect();
+    let advice = "in this design: its terms are not those of sources beside it; keep the surface out of it by bounds of the design, or take \
+                  a smaller radius";
+    Ok(found?.into_iter().flatten().map(|message| format!("{message}, {advice}")).collect())
 }
 
 /// An expansion on a mesh.

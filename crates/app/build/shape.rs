@@ -16,13 +16,11 @@ use fluxmorph_solver::FieldModel;
 use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
 use super::entries::{is_air, material};
 use super::functional::FixedElements;
+use super::held::held_node_fault;
 use super::plausible;
 use super::soundness::unit_warning;
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
-
-/// Sine of the angle to a plane up to which a direction is along it: files carry few digits, and their facets differ by that.
-const ALONG: f64 = 1e-3;
 
 /// Cosine of the angle to the motion of the design up to which a face lies across it.
 const ACROSS: f64 = 0.7;
@@ -355,7 +353,7 @@ fn vanishing_faults(
 
 /// Whether a node is a design node or has a component that the elastic map decides.
 pub(super) fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) -> bool {
-    surface.nodes().binary_search(&node).is_ok() || (0..3).any(|component| map.is_unknown(node, component))
+    surface.nodes().binary_search(&node).is_ok() || map.is_unknown(node)
 }
 
 /// Refuses a remesh region that meets the shell of open space, which must stay where it is, or an observation region of which it is
@@ -438,53 +436,4 @@ fn coil_at(config: &Config, mesh: &Mesh, element: ElementId) -> String {
         [one] => format!("coils[{one}].center"),
         _ => "coils".to_owned(),
     }
-}
-
-/// Refuses a motion of nodes whose condition belongs to where they lie: on curved or oblique surfaces, and where A is
-/// prescribed.
-fn held_node_fault(
-    inputs: &Inputs<'_>,
-    surface: &DesignSurface,
-    map: &ElasticMap,
-    model: &FieldModel,
-) -> Option<Diagnostic> {
-    let (space, unknowns) = (model.space(), model.unknowns());
-    let moves = |node: NodeId| may_move(surface, map, node);
-    if let Some(held) = unknowns.held_carriers().find(|&n| space.vertices_of(n).into_iter().any(moves)) {
-        return Some(leaves_its_surface(inputs, space.position(inputs.mesh, held)));
-    }
-    let designed = |node: NodeId| surface.nodes().binary_search(&node).ok();
-    let leaves = |node: NodeId, axis: usize| match designed(node) {
-        Some(i) => surface.directions()[i][axis] != 0.0,
-        None => map.is_unknown(node, axis),
-    };
-    if let Some((node, _)) = unknowns.oblique_nodes().iter().find(|(node, normal)| match designed(*node) {
-        Some(i) => dot(surface.directions()[i], *normal).abs() > ALONG * norm(surface.directions()[i]),
-        None => (0..3).any(|axis| map.is_unknown(*node, axis) && normal[axis].abs() > ALONG),
-    }) {
-        return Some(leaves_its_surface(inputs, inputs.mesh.point(*node)));
-    }
-    let (node, axis) = unknowns.plane_nodes().find_map(|(node, axes)| {
-        (0..3).find(|&axis| axes >> axis & 1 == 1 && leaves(node, axis)).map(|axis| (node, axis))
-    })?;
-    let message = format!(
-        "a plane with a condition at right angles to {} would lose its nodes at {}",
-        ["x", "y", "z"][axis],
-        millimetres(inputs.mesh.point(node))
-    );
-    let fault = inputs.source.diagnostic("remesh", message);
-    Some(fault.expected(match designed(node) {
-        Some(_) => "a design.direction along the plane, or a design.surface that ends before it",
-        None => "the plane listed in remesh.slide, or a remesh region that ends before it",
-    }))
-}
-
-/// A node of a conditioned surface at right angles to no axis that would leave it.
-fn leaves_its_surface(inputs: &Inputs<'_>, place: Point) -> Diagnostic {
-    let message = format!(
-        "a surface with a condition that is curved, oblique or has an applied field would move at {}",
-        millimetres(place)
-    );
-    let fault = inputs.source.diagnostic("remesh", message);
-    fault.expected("such surfaces outside the remesh region, or listed in remesh.fixed")
 }

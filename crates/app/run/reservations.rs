@@ -16,9 +16,11 @@ use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 use super::excess;
 use super::reported::under;
 use crate::build::{
-    Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, result_warnings, skin_warnings,
+    Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, multipole, result_warnings,
+    skin_warnings,
 };
 use crate::config::{Config, Goal, RegionModel};
+use crate::error::Error;
 use crate::files::ObjectiveResult;
 
 /// Polarisation beyond which no iron follows a linear law [T]: electrical steels saturate at 2.0, pure iron at 2.16 (R. M.
@@ -51,7 +53,11 @@ impl Saturated {
 }
 
 /// All that is to be said of the design of an analysis.
-pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<String> {
+pub(super) fn reservations(
+    config: &Config,
+    setup: &Setup,
+    analysis: &Analysis,
+) -> Result<Vec<String>, Error> {
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
     all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
@@ -60,7 +66,8 @@ pub(super) fn reservations(config: &Config, setup: &Setup, analysis: &Analysis) 
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
     all.extend(result_warnings(config, &setup.audits, &analysis.mesh, &least.unwrap_or_default()));
-    all
+    all.extend(multipole::warnings(config, problem, &analysis.mesh)?);
+    Ok(all)
 }
 
 /// An objective that is to be made large and is negative at the initial design.

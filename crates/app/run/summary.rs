@@ -55,7 +55,7 @@ impl Session<'_> {
         let design = problem.shape().zip(design).map(|(shape, values)| design_result(shape, values));
         let topology = mesh.topology();
         let inductance_h = terminals.into_iter().next().unwrap_or_default().inductance;
-        let more = reservations(self.config, &self.setup, analysis);
+        let more = reservations(self.config, &self.setup, analysis)?;
         more.iter().for_each(|warning| observer.warning(warning));
         let warnings = self.warnings.iter().cloned().chain(more).collect();
         Ok(RunResult {

@@ -10,8 +10,14 @@
 //! * unconstrained elsewhere, subregions with different laws inside one region of the mesh included.
 //!
 //! Design nodes are prescribed in all components, whatever faces meet there. Nodes listed as fixed come next.
+//!
+//! Sliding planes may lie at any angle. A node whose planes hold it in directions between the axes has a frame of its own,
+//! which begins with these.
 
-use fluxmorph_geometry::tet4::{FACES, area_vector, centroid, norm};
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::directions::{FixedDirections, Frame, axis_of, extend, unit};
+use fluxmorph_geometry::tet4::{FACES, Point, area_vector, centroid, cross, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 use rayon::prelude::*;
@@ -19,8 +25,12 @@ use rayon::prelude::*;
 use crate::deform::RemeshSetup;
 use crate::error::RemeshError;
 
-/// Largest component of a unit normal across the axis of a sliding face: coordinates in files carry 6 or more digits.
+/// Sine of the largest angle between faces of one plane: coordinates in files carry 6 or more digits.
 const NORMAL_TOLERANCE: f64 = 1e-6;
+
+/// Sine of the angle between faces of a sliding surface below which it counts as curved, and not as two planes: 25 degrees,
+/// coarser than the facets of most meshes.
+const CURVED: f64 = 0.42;
 
 /// What the nodes of a surface may do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +39,7 @@ pub enum BoundaryKind {
     Design,
     /// No displacement.
     Fixed,
-    /// No displacement along the normal of each face; faces must be normal to an axis.
+    /// No displacement along the normal of each face; the surface must consist of planes.
     Slide,
     /// No constraint, where the default would be fixed.
     Free,
@@ -78,10 +88,15 @@ pub(crate) struct NodeConditions {
     pub(crate) is_design: Vec<bool>,
     /// By node: bit `c` is set where component `c` is held at zero; all three outside the remesh region.
     held: Vec<u8>,
+    /// Directions of the components at nodes where they are not along the coordinate axes.
+    pub(crate) frames: BTreeMap<NodeId, Frame>,
 }
 
 /// All three components.
 const ALL: u8 = 0b111;
+
+/// What is left of a normal beside other directions above which it is a new one: planes meet at larger angles.
+const NEW: f64 = 1e-3;
 
 impl NodeConditions {
     /// Decides every node; `elements` are those of the remesh region.
@@ -98,7 +113,7 @@ impl NodeConditions {
         let mut held = vec![ALL; node_count];
         let mut touched_outside = vec![true; node_count];
         for node in elements.iter().flat_map(|&e| topology.tet(e)) {
-            held[node.index()] = 0;
+            held[node.index()] = setup.kinematic_constraint.held();
             touched_outside[node.index()] = false;
         }
         let mut in_region = vec![false; topology.tets().len()];
@@ -107,16 +122,22 @@ impl NodeConditions {
             topology.tet(e).iter().for_each(|n| touched_outside[n.index()] = true);
         }
 
+        let mut oblique: BTreeMap<NodeId, Vec<usize>> = BTreeMap::new();
         let region_of = topology.region_of();
         for group in faces.chunk_by(|a, b| a.0 == b.0) {
             let nodes = group[0].0;
             let by_default = match group {
-                [(_, a), (_, b)] if region_of[a.index()] == region_of[b.index()] => 0,
-                _ => ALL,
+                [(_, a), (_, b)] if region_of[a.index()] == region_of[b.index()] => Rule::Free,
+                _ => Rule::Fixed,
             };
-            let bits = rules.held(nodes).unwrap_or(by_default);
+            let rule = rules.of(nodes).unwrap_or(by_default);
             for node in nodes {
-                held[node.index()] |= bits;
+                match rule {
+                    Rule::Fixed => held[node.index()] = ALL,
+                    Rule::Slide(axis @ 0..3) => held[node.index()] |= 1 << axis,
+                    Rule::Slide(plane) => oblique.entry(node).or_default().push(plane),
+                    Rule::Free => {}
+                }
                 if group.len() == 1 {
                     touched_outside[node.index()] = false;
                 }
@@ -128,9 +149,26 @@ impl NodeConditions {
         }
         setup.fixed_nodes.iter().for_each(|n| held[n.index()] = ALL);
 
-        let mut conditions = Self { design_nodes: Vec::new(), is_design: vec![false; node_count], held };
+        let (is_design, frames) = (vec![false; node_count], BTreeMap::new());
+        let mut conditions = Self { design_nodes: Vec::new(), is_design, held, frames };
         conditions.add_design_nodes(mesh, setup, &rules.design_nodes, elements)?;
+        for (node, planes) in oblique {
+            conditions.keep_to(node, planes.iter().map(|&plane| rules.normals[plane]));
+        }
         Ok(conditions)
+    }
+
+    /// Holds a node along normals too.
+    fn keep_to(&mut self, node: NodeId, normals: impl Iterator<Item = Point>) {
+        let held = &mut self.held[node.index()];
+        let along_axes = (0..3).filter(|c| *held >> c & 1 == 1).map(|c| Frame::COORDINATES.axes[c]);
+        let mut basis: Vec<Point> = along_axes.collect();
+        normals.for_each(|normal| extend(&mut basis, normal, NEW));
+        let FixedDirections { frame, fixed } = FixedDirections::spanned_by(&basis);
+        *held = fixed;
+        if frame != Frame::COORDINATES && !self.is_design[node.index()] {
+            self.frames.insert(node, frame);
+        }
     }
 
     fn add_design_nodes(
@@ -162,7 +200,7 @@ impl NodeConditions {
         Ok(())
     }
 
-    /// Whether a displacement component is an unknown of Eq. 3.
+    /// Whether a displacement component, in the frame of the node, is an unknown of Eq. 3.
     #[inline]
     pub(crate) fn is_unknown(&self, node: NodeId, component: usize) -> bool {
         !self.is_design[node.index()] && self.held[node.index()] >> component & 1 == 0
@@ -186,10 +224,21 @@ fn sorted_faces(topology: &Topology, elements: &[ElementId]) -> Vec<([NodeId; 3]
     faces
 }
 
+/// What holds at a face, the strongest first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Rule {
+    Fixed,
+    /// In the plane with a normal of [`FaceRules::normals`].
+    Slide(usize),
+    Free,
+}
+
 /// What the listed surfaces say about single faces.
 struct FaceRules {
     /// Sorted by face; the strongest rule of a face comes first.
-    rules: Vec<([NodeId; 3], std::cmp::Reverse<u8>)>,
+    rules: Vec<([NodeId; 3], Rule)>,
+    /// Unit normals of sliding planes; the first three are the coordinate axes.
+    normals: Vec<Point>,
     /// Nodes of design surfaces, ascending.
     design_nodes: Vec<NodeId>,
 }
@@ -202,10 +251,12 @@ impl FaceRules {
         is_design: &[bool],
     ) -> Result<Self, RemeshError> {
         let mut rules = Vec::new();
+        let mut normals = Frame::COORDINATES.axes.to_vec();
         let mut design_nodes = Vec::new();
         for boundary in boundaries {
             let list = || format!("the surface `{}`", boundary.name);
             let mut used = false;
+            let mut planes = Vec::new();
             for &triangle in &boundary.triangles {
                 check_nodes(&list(), &triangle, mesh.topology().node_count())?;
                 let key = face_key(triangle);
@@ -213,44 +264,64 @@ impl FaceRules {
                     continue;
                 }
                 used = true;
-                let bits = match boundary.kind {
+                let rule = match boundary.kind {
                     BoundaryKind::Design => {
                         design_nodes.extend(triangle);
                         continue;
                     }
-                    BoundaryKind::Fixed => ALL,
+                    BoundaryKind::Fixed => Rule::Fixed,
                     // What the design prescribes need not be flat: an optimum goes on as a mesh.
                     BoundaryKind::Slide if triangle.iter().all(|n| is_design[n.index()]) => continue,
-                    BoundaryKind::Slide => 1 << normal_axis(mesh, boundary, triangle)?,
-                    BoundaryKind::Free => 0,
+                    BoundaryKind::Slide => {
+                        Rule::Slide(plane(mesh, (boundary, triangle), &mut planes, &mut normals)?)
+                    }
+                    BoundaryKind::Free => Rule::Free,
                 };
-                rules.push((key, std::cmp::Reverse(bits)));
+                rules.push((key, rule));
             }
             if !used {
                 let (surface, kind) = (boundary.name.clone(), boundary.kind.name());
                 return Err(RemeshError::SurfaceElsewhere { surface, kind });
             }
         }
-        // More bits are the stronger rule; two slides on one face have one normal.
         rules.sort_unstable();
         design_nodes.sort_unstable();
         design_nodes.dedup();
-        Ok(Self { rules, design_nodes })
+        Ok(Self { rules, normals, design_nodes })
     }
 
-    /// Components held on a face that a surface lists.
-    fn held(&self, face: [NodeId; 3]) -> Option<u8> {
+    /// The rule of a face that a surface lists.
+    fn of(&self, face: [NodeId; 3]) -> Option<Rule> {
         let first = self.rules.partition_point(|rule| rule.0 < face);
-        self.rules.get(first).filter(|rule| rule.0 == face).map(|rule| rule.1.0)
+        self.rules.get(first).filter(|rule| rule.0 == face).map(|rule| rule.1)
     }
 }
 
-/// The axis that a sliding triangle is normal to.
-fn normal_axis(mesh: &Mesh, boundary: &Boundary, triangle: [NodeId; 3]) -> Result<usize, RemeshError> {
+/// The plane of a sliding triangle, by its place among all `normals`; `planes` are those of the surface before.
+fn plane(
+    mesh: &Mesh,
+    (boundary, triangle): (&Boundary, [NodeId; 3]),
+    planes: &mut Vec<usize>,
+    normals: &mut Vec<Point>,
+) -> Result<usize, RemeshError> {
     let vertices = triangle.map(|n| mesh.point(n));
-    let area = area_vector(vertices);
-    let normal = area.map(|a| a / norm(area));
-    (0..3).find(|&axis| (0..3).all(|d| d == axis || normal[d].abs() <= NORMAL_TOLERANCE)).ok_or_else(|| {
-        RemeshError::SlideNormal { surface: boundary.name.clone(), centroid: centroid(vertices), normal }
-    })
+    let normal = unit(area_vector(vertices));
+    let angle = |k: usize| norm(cross(normals[k], normal));
+    if let Some(&known) = planes.iter().find(|&&k| angle(k) <= NORMAL_TOLERANCE) {
+        return Ok(known);
+    }
+    if planes.iter().any(|&k| angle(k) < CURVED) {
+        return Err(RemeshError::SlideCurved {
+            surface: boundary.name.clone(),
+            centroid: centroid(vertices),
+            normal,
+        });
+    }
+    let known = axis_of(normal).or_else(|| (3..normals.len()).find(|&k| angle(k) <= NORMAL_TOLERANCE));
+    let plane = known.unwrap_or_else(|| {
+        normals.push(normal);
+        normals.len() - 1
+    });
+    planes.push(plane);
+    Ok(plane)
 }

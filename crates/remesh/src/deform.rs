@@ -7,7 +7,7 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::fem::{
-    BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix,
+    BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix, RotatedMatrix,
 };
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::quality::QualityReport;
@@ -19,6 +19,7 @@ use crate::boundary::{Boundary, NodeConditions};
 use crate::distributed::DistributedElastic;
 use crate::error::RemeshError;
 use crate::force::nodal_force;
+use crate::freedom::Freedom;
 use crate::policy::StiffnessPolicy;
 use crate::restraint;
 use crate::solver::{ElasticSolver, SolverAnalysis, SolverChoice};
@@ -37,10 +38,11 @@ pub enum KinematicConstraint {
 }
 
 impl KinematicConstraint {
-    fn allows(self, component: usize) -> bool {
+    /// Bit `c` is set where component `c` is held at zero.
+    pub(crate) fn held(self) -> u8 {
         match self {
-            Self::Free => true,
-            Self::Axis(axis) => component == axis,
+            Self::Free => 0,
+            Self::Axis(axis) => 0b111 & !(1 << axis),
         }
     }
 }
@@ -88,7 +90,7 @@ struct Plan {
     setup: RemeshSetup,
     body: Arc<Body>,
     design_nodes: Vec<NodeId>,
-    unknowns: Arc<DofMap<3>>,
+    unknowns: Arc<Freedom>,
     prescribed: DofMap<3>,
     /// In one process.
     stiffness: Option<(BlockPattern<3>, BoundGroup<4>)>,
@@ -165,7 +167,7 @@ impl ElasticMap {
     /// # Errors
     /// As [`ElasticMap::linear`].
     pub(crate) fn solve_nodal(&self, right_side: Vec<Point>) -> Result<Vec<Point>, RemeshError> {
-        let mut unknowns = vec![0.0; self.plan.unknowns.count()];
+        let mut unknowns = vec![0.0; self.plan.unknowns.dofs().count()];
         for (node, value) in (0..).map(NodeId).zip(right_side) {
             self.plan.unknowns.scatter_add(&mut unknowns, node, value);
         }
@@ -214,7 +216,7 @@ impl ElasticMap {
         for (&node, u) in plan.design_nodes.iter().zip(design) {
             plan.prescribed.scatter_add(&mut prescribed, node, u.map(|u| -u));
         }
-        let mut right_side = vec![0.0; plan.unknowns.count()];
+        let mut right_side = vec![0.0; plan.unknowns.dofs().count()];
         self.coupling.mul(&prescribed, &mut right_side);
         let mut displacement = self.solve(right_side)?;
         for (node, u) in plan.design_nodes.iter().zip(design) {
@@ -246,7 +248,7 @@ impl ElasticMap {
     }
 
     /// Equations of the unknown components `d`.
-    pub(crate) fn unknowns(&self) -> &DofMap<3> {
+    pub(crate) fn unknowns(&self) -> &Freedom {
         &self.plan.unknowns
     }
 
@@ -277,7 +279,7 @@ impl ElasticMap {
 
     /// Number of equations of Eq. 3 (the column "Equ. Num." of Table 2).
     pub fn equation_count(&self) -> usize {
-        self.plan.unknowns.count()
+        self.plan.unknowns.dofs().count()
     }
 
     /// Bytes of the solver at most: the factors, and the matrix where it is kept; zero where it is distributed.
@@ -304,9 +306,15 @@ impl ElasticMap {
         }
     }
 
-    /// Whether a displacement component at a node is an unknown of Eq. 3.
-    pub fn is_unknown(&self, node: NodeId, component: usize) -> bool {
-        self.plan.unknowns.equation(node, component).is_some()
+    /// The part of a nodal vector along the unknowns of Eq. 3: without what is prescribed or held, or at right angles to a
+    /// plane that a node keeps to.
+    pub fn unknown_part(&self, node: NodeId, vector: Point) -> Point {
+        self.plan.unknowns.part(node, vector)
+    }
+
+    /// Whether a node may move by an unknown of Eq. 3.
+    pub fn is_unknown(&self, node: NodeId) -> bool {
+        self.plan.unknowns.dofs().unknown_bits(node) != 0
     }
 }
 
@@ -319,7 +327,7 @@ impl Plan {
     fn matrix<L: LocalMatrix<f64, 4, 3>>(&self, of: impl Fn(usize) -> L + Sync) -> CsrMatrix<f64> {
         let (pattern, group) = self.stiffness.as_ref().expect("one process has the whole pattern");
         let mut matrix = CsrMatrix::zeros(pattern.structure());
-        pattern.assemble(group, &mut matrix.values, |e: ElementId| of(e.index()));
+        pattern.assemble(group, &mut matrix.values, |e: ElementId| self.turned(&of, e.index()));
         matrix
     }
 
@@ -327,18 +335,25 @@ impl Plan {
     fn coupling_matrix<L: LocalMatrix<f64, 4, 3>>(&self, of: impl Fn(usize) -> L + Sync) -> CsrMatrix<f64> {
         let (pattern, group) = &self.coupling;
         let mut matrix = CsrMatrix::zeros(pattern.structure());
-        pattern.assemble(group, &mut matrix.values, |e: ElementId| of(self.coupled[e.index()] as usize));
+        pattern.assemble(group, &mut matrix.values, |e: ElementId| {
+            self.turned(&of, self.coupled[e.index()] as usize)
+        });
         matrix
+    }
+
+    /// The matrix of the element at a position in the body, in the frames of its nodes.
+    fn turned<L>(&self, of: impl Fn(usize) -> L, position: usize) -> RotatedMatrix<'_, L, 4> {
+        self.unknowns.turned(of(position), self.topology().tet(self.body.elements[position]))
     }
 
     fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
         let body = Arc::new(Body::new(reference.topology(), &setup.subregions)?);
         let Body { topology, elements, .. } = &*body;
-        let conditions = NodeConditions::new(reference, &setup, elements)?;
+        let mut conditions = NodeConditions::new(reference, &setup, elements)?;
         let node_count = topology.node_count();
-        let unknowns = Arc::new(DofMap::<3>::of_nodes(node_count, |node, c| {
-            setup.kinematic_constraint.allows(c) && conditions.is_unknown(node, c)
-        }));
+        let frames = std::mem::take(&mut conditions.frames);
+        let dofs = DofMap::of_nodes(node_count, |node, c| conditions.is_unknown(node, c));
+        let unknowns = Arc::new(Freedom::new(dofs, frames));
         let prescribed = DofMap::<3>::of_nodes(node_count, |node, _| conditions.is_design[node.index()]);
         restraint::check(reference, elements, &unknowns)?;
 
@@ -347,8 +362,8 @@ impl Plan {
         let coupled: Vec<u32> =
             (0..).zip(elements).filter(|&(_, &e)| at_design(e)).map(|(position, _)| position).collect();
         let at_coupled = coupled.iter().map(|&position| topology.tet(elements[position as usize]));
-        let coupling = bind_pattern(&unknowns, &prescribed, at_coupled.collect());
-        let moving = moving_elements(&body, &unknowns, &conditions.design_nodes);
+        let coupling = bind_pattern(unknowns.dofs(), &prescribed, at_coupled.collect());
+        let moving = moving_elements(&body, unknowns.dofs(), &conditions.design_nodes);
         let (stiffness, analysis) = match &setup.ownership {
             Some(ownership) => {
                 let distributed = DistributedElastic::new(ownership, (&body, &unknowns), &moving);
@@ -356,8 +371,8 @@ impl Plan {
             }
             None => {
                 let tets = elements.iter().map(|&e| topology.tet(e)).collect();
-                let stiffness = bind_pattern(&unknowns, &unknowns, tets);
-                let analysis = SolverAnalysis::new(setup.solver, &unknowns, stiffness.0.structure())?;
+                let stiffness = bind_pattern(unknowns.dofs(), unknowns.dofs(), tets);
+                let analysis = SolverAnalysis::new(setup.solver, unknowns.dofs(), stiffness.0.structure())?;
                 (Some(stiffness), analysis)
             }
         };

@@ -19,6 +19,7 @@ use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 use crate::body::Body;
 use crate::deform::bind_pattern;
 use crate::error::RemeshError;
+use crate::freedom::Freedom;
 use crate::policy::StiffnessPolicy;
 use crate::solver::{MAX_ITERATIONS, TOLERANCE};
 
@@ -46,12 +47,12 @@ impl DistributedElastic {
     /// Distributes a body; every rank does.
     pub(crate) fn new(
         ownership: &Ownership,
-        (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>),
+        (body, unknowns): (&Arc<Body>, &Arc<Freedom>),
         moving: &Arc<[ElementId]>,
     ) -> Self {
         let handler = ElasticHandler::new(ownership, (body, unknowns), moving);
         let channel = ownership.group.register(Box::new(handler));
-        Self { channel, next: AtomicU64::new(0), unknowns: unknowns.count() }
+        Self { channel, next: AtomicU64::new(0), unknowns: unknowns.dofs().count() }
     }
 
     /// Has all ranks assemble and factor on a reference; the slot. Workers have none of their own.
@@ -127,6 +128,7 @@ impl DistributedElastic {
 /// What a rank holds of the elastic system.
 struct ElasticHandler {
     body: Arc<Body>,
+    unknowns: Arc<Freedom>,
     layout: Arc<RowLayout>,
     pattern: BlockPattern<3>,
     group: BoundGroup<4>,
@@ -140,24 +142,24 @@ struct ElasticHandler {
 impl ElasticHandler {
     fn new(
         ownership: &Ownership,
-        (body, unknowns): (&Arc<Body>, &Arc<DofMap<3>>),
+        (body, unknowns): (&Arc<Body>, &Arc<Freedom>),
         moving: &[ElementId],
     ) -> Self {
         let topology = &body.topology;
         let owner = |carrier: CarrierId| ownership.partition.owner_of(NodeId::new(carrier.index()));
         let layout =
-            Arc::new(RowLayout::new(unknowns, ownership.group.size(), ownership.group.rank(), owner));
+            Arc::new(RowLayout::new(unknowns.dofs(), ownership.group.size(), ownership.group.rank(), owner));
         let rows = DofMap::of_nodes(topology.node_count(), |node, c| {
-            ownership.owns(node) && unknowns.equation(node, c).is_some()
+            ownership.owns(node) && unknowns.dofs().equation(node, c).is_some()
         });
         let touches = |e: ElementId| topology.tet(e).iter().any(|&n| ownership.owns(n));
         let held: Vec<u32> =
             (0..).zip(&body.elements).filter(|&(_, &e)| touches(e)).map(|(position, _)| position).collect();
         let connectivity = held.iter().map(|&position| topology.tet(body.elements[position as usize]));
-        let (pattern, group) = bind_pattern(&rows, unknowns, connectivity.collect());
+        let (pattern, group) = bind_pattern(&rows, unknowns.dofs(), connectivity.collect());
         let moving = ownership.owned_among(moving);
-        let (body, slots) = (Arc::clone(body), BTreeMap::new());
-        Self { body, layout, pattern, group, held, moving, slots }
+        let (body, unknowns, slots) = (Arc::clone(body), Arc::clone(unknowns), BTreeMap::new());
+        Self { body, unknowns, layout, pattern, group, held, moving, slots }
     }
 
     fn factor(
@@ -170,7 +172,9 @@ impl ElasticHandler {
         let weighting = policy.weighting(reference, &self.body.elements);
         let mut matrix = CsrMatrix::<f64>::zeros(self.pattern.structure());
         self.pattern.assemble(&self.group, &mut matrix.values, |e| {
-            self.body.stiffness(reference, &weighting, self.held[e.index()] as usize)
+            let position = self.held[e.index()] as usize;
+            let nodes = self.body.topology.tet(self.body.elements[position]);
+            self.unknowns.turned(self.body.stiffness(reference, &weighting, position), nodes)
         });
         let values: Vec<c64> = matrix.values.iter().map(|&v| c64::from(v)).collect();
         let structure = Arc::clone(self.pattern.structure());

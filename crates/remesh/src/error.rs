@@ -53,13 +53,14 @@ pub enum RemeshError {
         /// Its kind: design, fixed, slide or free.
         kind: &'static str,
     },
-    /// A sliding surface has a triangle whose normal is not along an axis.
+    /// A sliding surface is curved.
     #[error(
-        "the surface `{surface}` cannot slide: its triangle at {} has the normal ({:.3}, {:.3}, {:.3}), and only faces normal \
-         to x, y or z may slide; list it as fixed, or where it has no condition as free",
+        "the surface `{surface}` cannot slide: its triangle at {} has the normal ({:.3}, {:.3}, {:.3}), and another \
+         has one within 25 degrees of it: it is curved, and only planes may slide; list it as fixed, or where it has no condition \
+         as free, and of two planes each as a surface of its own",
         millimetres(*centroid), normal[0], normal[1], normal[2]
     )]
-    SlideNormal {
+    SlideCurved {
         surface: String,
         /// Centroid of the triangle [m].
         centroid: [f64; 3],

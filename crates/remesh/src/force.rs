@@ -4,13 +4,17 @@
 //! several subregions carries the mean of theirs. Only the components that are unknown are used: `f_b` does not enter
 //! Eq. 3.
 
-use fluxmorph_geometry::fem::DofMap;
 use fluxmorph_geometry::{NodeId, Topology};
 
+use crate::freedom::Freedom;
 use crate::subregion::Subregion;
 
 /// The force vector `f_d` [N] of Eq. 3, one entry per unknown; `None` when every subregion's force is zero.
-pub fn nodal_force(topology: &Topology, subregions: &[Subregion], unknowns: &DofMap<3>) -> Option<Vec<f64>> {
+pub(crate) fn nodal_force(
+    topology: &Topology,
+    subregions: &[Subregion],
+    unknowns: &Freedom,
+) -> Option<Vec<f64>> {
     if subregions.iter().all(|s| s.force == [0.0; 3]) {
         return None;
     }
@@ -29,7 +33,7 @@ pub fn nodal_force(topology: &Topology, subregions: &[Subregion], unknowns: &Dof
             }
         }
     }
-    let mut force = vec![0.0; unknowns.count()];
+    let mut force = vec![0.0; unknowns.dofs().count()];
     for (i, (sum, &count)) in sum.iter().zip(&count).enumerate().filter(|(_, (_, count))| **count > 0) {
         unknowns.scatter_add(&mut force, NodeId::new(i), sum.map(|f| f / f64::from(count)));
     }
@@ -38,6 +42,10 @@ pub fn nodal_force(topology: &Topology, subregions: &[Subregion], unknowns: &Dof
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use fluxmorph_geometry::fem::DofMap;
+
     use super::*;
     use fluxmorph_geometry::{ElementId, RegionId};
 
@@ -46,7 +54,8 @@ mod tests {
         let tets = vec![[0, 1, 2, 3].map(NodeId), [4, 1, 3, 2].map(NodeId)];
         let topology = Topology::new(5, tets, vec!["all".into()], vec![RegionId(0); 2]).expect("two tets");
         let part = |e, z| Subregion { force: [0.0, 0.0, z], ..Subregion::new("part", vec![ElementId(e)]) };
-        let unknowns = DofMap::<3>::of_nodes(5, |node, c| c == 2 && node != NodeId(3));
+        let dofs = DofMap::of_nodes(5, |node, c| c == 2 && node != NodeId(3));
+        let unknowns = Freedom::new(dofs, BTreeMap::new());
         let force = nodal_force(&topology, &[part(0, 1.0), part(1, 3.0)], &unknowns);
         assert_eq!(force, Some(vec![1.0, 2.0, 2.0, 3.0]));
         assert_eq!(nodal_force(&topology, &[part(0, 0.0)], &unknowns), None);

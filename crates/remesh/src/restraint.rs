@@ -4,16 +4,17 @@
 //! rigid motions at those components, that is: `Rᵀ R`, shape `(6, 6)`, is regular.
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
-use fluxmorph_geometry::fem::DofMap;
+use fluxmorph_geometry::tet4::cross;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
 
 use crate::error::RemeshError;
+use crate::freedom::Freedom;
 
 /// Pivots below this share of the largest are zero; lengths are scaled to the part, so that true pivots are moderate.
 const SINGULAR: f64 = 1e-10;
 
 /// Refuses a region of which a part can move as a rigid body.
-pub(crate) fn check(mesh: &Mesh, elements: &[ElementId], unknowns: &DofMap<3>) -> Result<(), RemeshError> {
+pub(crate) fn check(mesh: &Mesh, elements: &[ElementId], unknowns: &Freedom) -> Result<(), RemeshError> {
     let topology = mesh.topology();
     let mut sets = DisjointSets::new(topology.node_count());
     for &e in elements {
@@ -24,14 +25,14 @@ pub(crate) fn check(mesh: &Mesh, elements: &[ElementId], unknowns: &DofMap<3>) -
     nodes.sort_unstable();
     nodes.dedup();
     for part in nodes.chunk_by(|a, b| a.0 == b.0) {
-        if part.iter().any(|&(_, n)| unknowns.unknown_bits(n) != 0) && !is_held(mesh, part, unknowns) {
+        if part.iter().any(|&(_, n)| unknowns.dofs().unknown_bits(n) != 0) && !is_held(mesh, part, unknowns) {
             return Err(RemeshError::Unrestrained { point: mesh.point(part[0].1) });
         }
     }
     Ok(())
 }
 
-fn is_held(mesh: &Mesh, part: &[(usize, NodeId)], unknowns: &DofMap<3>) -> bool {
+fn is_held(mesh: &Mesh, part: &[(usize, NodeId)], unknowns: &Freedom) -> bool {
     let mut limits = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
     for &(_, n) in part {
         let p = mesh.point(n);
@@ -45,13 +46,11 @@ fn is_held(mesh: &Mesh, part: &[(usize, NodeId)], unknowns: &DofMap<3>) -> bool 
     for &(_, n) in part {
         let p = mesh.point(n);
         let x: [f64; 3] = std::array::from_fn(|d| (2.0 * p[d] - limits[0][d] - limits[1][d]) / size);
-        for c in (0..3).filter(|&c| unknowns.equation(n, c).is_none()) {
-            let mut row = [0.0; 6];
-            row[c] = 1.0;
-            // Component c of r × x.
-            let (next, last) = ((c + 1) % 3, (c + 2) % 3);
-            row[3 + next] = x[last];
-            row[3 + last] = -x[next];
+        let axes = unknowns.axes(n);
+        for c in (0..3).filter(|&c| unknowns.dofs().equation(n, c).is_none()) {
+            // The component of t + r × x along the axis e: e · t + r · (x × e).
+            let (axis, turning) = (axes[c], cross(x, axes[c]));
+            let row: [f64; 6] = std::array::from_fn(|i| if i < 3 { axis[i] } else { turning[i - 3] });
             for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
                 gram[i][j] += row[i] * row[j];
             }

@@ -20,8 +20,8 @@ impl ElasticMap {
     /// If `nodal` does not have one entry per mesh node.
     pub fn gradient(&self, nodal: &[Point]) -> Result<Vec<Point>, RemeshError> {
         let (unknowns, prescribed) = (self.unknowns(), self.prescribed());
-        assert_eq!(nodal.len(), unknowns.carrier_count(), "one derivative per mesh node");
-        let mut adjoint = vec![0.0; unknowns.count()];
+        assert_eq!(nodal.len(), unknowns.dofs().carrier_count(), "one derivative per mesh node");
+        let mut adjoint = vec![0.0; unknowns.dofs().count()];
         for (node, &g) in (0..).map(NodeId).zip(nodal) {
             unknowns.scatter_add(&mut adjoint, node, g);
         }

@@ -2,13 +2,12 @@
 
 use std::collections::{HashMap, HashSet};
 
-use fluxmorph_geometry::directions::beside;
+use fluxmorph_geometry::directions::{axis_of, beside};
 use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::triangle_edges;
 use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 
 use crate::error::SolverError;
-use crate::fixed_directions::axis_of;
 
 /// Share of an applied field's largest `|A|` that may be left where another condition says otherwise. A face of a fine mesh with
 /// coordinates of six digits has a direction of its own; the error of what is left is of this size, too.

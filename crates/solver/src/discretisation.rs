@@ -5,7 +5,8 @@
 //! but only the rows of its own nodes and the elements that touch them ([`LocalEntities`]).
 
 use fluxmorph_geometry::fem::{
-    BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, Hosts, LocalMatrix, c64,
+    BlockPattern, BoundGroup, Coupling, CsrMatrix, DofMap, ElementGroup, Hosts, LocalMatrix, RotatedMatrix,
+    c64,
 };
 use fluxmorph_geometry::parallel::{CoarseSpace, Ownership, RowLayout};
 use fluxmorph_geometry::tet4::area_vector;
@@ -21,7 +22,6 @@ use crate::family::{self, Local, Matrices};
 use crate::linear::{aggregation, hats};
 use crate::local_entities::LocalEntities;
 use crate::prolongation::{ScalarSpace, components, injection, prolongation};
-use crate::rotated::RotatedMatrix;
 use crate::space::{Carriers, Space};
 use crate::surface::SurfaceTerm;
 use crate::tangents::Tangents;

@@ -10,8 +10,8 @@
 //! plane meets it, in the mean normal of the faces on one side, not quite at right angles: its normal is turned into the
 //! plane there.
 
-use fluxmorph_geometry::directions::{extend, unit};
-use fluxmorph_geometry::tet4::{Point, cross, dot};
+use fluxmorph_geometry::directions::{FixedDirections, Frame, axis_of, extend, tangents, unit};
+use fluxmorph_geometry::tet4::{Point, dot};
 
 /// Angle between faces above which they are two surfaces: finer than the facets of any sensible mesh of a curved
 /// surface, coarser than a corner.
@@ -19,10 +19,6 @@ pub(crate) const CREASE: f64 = 40.0;
 
 /// Angle by which a curved surface's mean normal may miss a plane it ends at: half a facet of [`CREASE`], and some.
 const SKEW: f64 = 25.0;
-
-/// Largest component of a unit vector across a coordinate axis with which it still counts as along it: coordinates in
-/// files carry six or more digits.
-pub(crate) const AXIS_TOLERANCE: f64 = 1e-6;
 
 /// What is left of a unit vector below which it depends on the others: after a normal is turned into the planes it ends
 /// at, directions are either new by the sine of [`CREASE`] or old up to rounding.
@@ -35,27 +31,6 @@ pub(crate) enum Fix {
     Tangential,
     /// The normal component.
     Normal,
-}
-
-/// Orthonormal directions at a node; its unknown components are along these.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Frame {
-    /// Directions 0, 1, 2.
-    pub(crate) axes: [Point; 3],
-}
-
-impl Frame {
-    /// The coordinate axes.
-    pub(crate) const COORDINATES: Self = Self { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] };
-}
-
-/// What is fixed at one node.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct FixedDirections {
-    /// Directions of the components.
-    pub(crate) frame: Frame,
-    /// Bit `k`: component `k` is fixed.
-    pub(crate) fixed: u8,
 }
 
 /// The fixed directions at a node at which faces with these area vectors meet.
@@ -93,7 +68,7 @@ pub(crate) fn fixed_directions(faces: &[(Fix, Point)]) -> FixedDirections {
             }
         }
     }
-    complete(&basis)
+    FixedDirections::spanned_by(&basis)
 }
 
 /// Area-weighted unit normals of the smooth surfaces that faces of one kind form.
@@ -108,46 +83,6 @@ fn smooth_surfaces(faces: &[(Fix, Point)]) -> Vec<(Fix, Point)> {
         }
     }
     sums.into_iter().map(|(fix, sum)| (fix, unit(sum))).collect()
-}
-
-/// The coordinate axis that a unit vector is along.
-pub(crate) fn axis_of(normal: Point) -> Option<usize> {
-    (0..3).find(|&axis| (0..3).all(|d| d == axis || normal[d].abs() <= AXIS_TOLERANCE))
-}
-
-/// Two unit vectors at right angles to a unit normal and to each other; coordinate axes where the normal is one.
-pub(crate) fn tangents(normal: Point) -> (Point, Point) {
-    let least = (0..3).fold(0, |best, d| if normal[d].abs() < normal[best].abs() { d } else { best });
-    let start = Frame::COORDINATES.axes[least];
-    let part = dot(start, normal);
-    let first = unit(std::array::from_fn(|d| start[d] - part * normal[d]));
-    (first, cross(normal, first))
-}
-
-/// The frame whose first directions are the fixed ones; the coordinate axes where these span the same.
-fn complete(basis: &[Point]) -> FixedDirections {
-    if basis.len() == 3 {
-        return FixedDirections { frame: Frame::COORDINATES, fixed: 0b111 };
-    }
-    let axes: Option<Vec<usize>> = basis.iter().map(|&b| axis_of(b)).collect();
-    if let Some(axes) = axes {
-        let fixed = axes.iter().fold(0, |bits, axis| bits | 1 << axis);
-        return FixedDirections { frame: Frame::COORDINATES, fixed };
-    }
-    let frame = match *basis {
-        [only] => {
-            let (first, second) = tangents(only);
-            Frame { axes: [only, first, second] }
-        }
-        [first, second, ..] => Frame { axes: [first, second, cross(first, second)] },
-        [] => Frame::COORDINATES,
-    };
-    let fixed = (1 << basis.len()) - 1;
-    // Two directions across an axis fix the two others, however they lie in the plane.
-    match (basis.len(), axis_of(frame.axes[2])) {
-        (2, Some(axis)) => FixedDirections { frame: Frame::COORDINATES, fixed: 0b111 & !(1 << axis) },
-        _ => FixedDirections { frame, fixed },
-    }
 }
 
 #[cfg(test)]

@@ -40,7 +40,6 @@ pub mod open;
 pub mod prolongation;
 pub mod recovery;
 mod reentrant;
-mod rotated;
 pub mod saturation;
 pub mod setup;
 pub mod solution;

@@ -8,11 +8,11 @@
 use std::sync::Arc;
 
 use fluxmorph_geometry::CarrierId;
+use fluxmorph_geometry::directions::Frame;
 use fluxmorph_geometry::fem::CsrMatrix;
 use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::tet4::dot;
 
-use crate::fixed_directions::Frame;
 use crate::space::Space;
 use crate::unknowns::{PSI, Unknowns};
 

@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 
+use fluxmorph_geometry::directions::axis_of;
 use fluxmorph_geometry::fem::{LocalMatrix, c64};
 use fluxmorph_geometry::tet4::{Point, area_vector, norm};
 use fluxmorph_geometry::topology::face_key;
@@ -14,7 +15,6 @@ use crate::element::lagrange::Lagrange;
 use crate::element::volume::Coefficients;
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
-use crate::fixed_directions::axis_of;
 use crate::material::{Material, VACUUM_PERMEABILITY};
 use crate::reentrant::beside_reentrant_edges;
 

@@ -21,6 +21,7 @@
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
+use fluxmorph_geometry::directions::{FixedDirections, Frame, axis_of};
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::{DofMap, c64};
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
@@ -31,7 +32,7 @@ use crate::boundary::{self, Boundary, CONFLICT};
 use crate::element::edge::functions::{WHITNEY, is_gradient};
 use crate::elements::ElementFamily;
 use crate::error::SolverError;
-use crate::fixed_directions::{Fix, FixedDirections, Frame, axis_of, fixed_directions};
+use crate::fixed_directions::{Fix, fixed_directions};
 use crate::gauge;
 use crate::harmonic::{self, HarmonicField};
 use crate::space::Space;

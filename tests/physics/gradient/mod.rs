@@ -106,7 +106,8 @@ fn node_gradient_holds(problem: &Problem) {
     // A hundredth of a millimetre: a small part of the thinnest layer of 1 mm, so that no element is inverted.
     let moves = |k: usize| {
         let node = NodeId::new(k / 3);
-        shape.motion().map().is_unknown(node, k % 3) || shape.surface().nodes().binary_search(&node).is_ok()
+        shape.motion().map().unknown_part(node, [1.0; 3])[k % 3] != 0.0
+            || shape.surface().nodes().binary_search(&node).is_ok()
     };
     let span: Vec<f64> = (0..gradient.len()).map(|k| if moves(k) { 1e-5 } else { 0.0 }).collect();
     let settings = Settings { first_step: 1.0, difference_step: 0.01, ..Settings::default() };

@@ -25,7 +25,8 @@ pub struct Criterion {
 /// Where a result has its value.
 #[derive(Clone, Debug, PartialEq)]
 enum Measured {
-    Objective,
+    /// That of all runs: values of different ones say nothing.
+    Objective(Box<Objective>),
     /// The term with this number.
     Term(usize),
     /// The constraint with this name.
@@ -61,7 +62,13 @@ impl Criterion {
         }
         order.extend(others);
         let &[first, second, ..] = order.as_slice() else { return None };
-        Some([first.min(second), first.max(second)].map(|k| Self::of_term(objective, k)))
+        let mut pair = [first.min(second), first.max(second)].map(|k| Self::of_term(objective, k));
+        if pair[0].name == pair[1].name {
+            pair.iter_mut().zip([first.min(second), first.max(second)]).for_each(|(criterion, k)| {
+                criterion.name += &format!(" (term {})", k + 1);
+            });
+        }
+        Some(pair)
     }
 
     fn of_objective(objective: &Objective) -> Self {
@@ -72,7 +79,7 @@ impl Criterion {
             },
             unit: objective.si_unit().filter(|unit| *unit != "1").unwrap_or_default(),
             smaller_is_better: objective.goal.sign() > 0.0,
-            of: Measured::Objective,
+            of: Measured::Objective(Box::new(objective.clone())),
         }
     }
 
@@ -108,7 +115,7 @@ impl Criterion {
     pub(super) fn value(&self, result: &RunResult) -> Option<f64> {
         let objective = result.objective.as_ref();
         let value = match &self.of {
-            Measured::Objective => objective?.best,
+            Measured::Objective(_) => objective?.best,
             Measured::Term(k) => objective?.terms.get(*k)?.value,
             Measured::Constraint(name) => {
                 result.constraints.iter().find(|constraint| constraint.name == *name)?.value

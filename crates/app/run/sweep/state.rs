@@ -6,8 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{Planned, Sweep};
+use crate::build::LARGEST_TABLE;
 use crate::config::{Config, MeshConfig, Optimizer, SourceMap, resolved_toml};
-use crate::files::{Disk, Manifest, MeshHash, OutputError, RunDirectory, RunResult, RunStatus, StopReason};
+use crate::files::{
+    Disk, FileHash, Manifest, MeshHash, OutputError, RunDirectory, RunResult, RunStatus, StopReason,
+    blake3_hex,
+};
 use crate::run;
 
 /// How far a combination is.
@@ -32,14 +36,14 @@ pub enum State {
 pub struct States<'a> {
     disk: &'a Arc<dyn Disk>,
     sweep: &'a Sweep,
-    /// Whether a mesh file still is the mesh of a hash: looked at once for all runs that share both.
-    meshes: BTreeMap<(PathBuf, String), bool>,
+    /// Whether a file still has the mesh or the table of a hash: looked at once for all runs that share both.
+    files: BTreeMap<(PathBuf, String), bool>,
 }
 
 impl<'a> States<'a> {
     /// Nothing is read yet.
     pub fn new(disk: &'a Arc<dyn Disk>, sweep: &'a Sweep) -> Self {
-        Self { disk, sweep, meshes: BTreeMap::new() }
+        Self { disk, sweep, files: BTreeMap::new() }
     }
 
     /// How far the run in the directory of a combination is.
@@ -87,9 +91,12 @@ impl<'a> States<'a> {
         let is_here = mesh_file(&config) == planned.mesh.as_deref();
         Ok(match result(&run, &manifest).filter(|_| has_ended(&manifest)) {
             Some(result) if !may_continue(&result, self.sweep, planned) => {
-                match self.has_mesh(planned, config, &source, &manifest) {
-                    true => State::Finished(result.stop_reason),
-                    false => other_mesh(),
+                if !self.has_mesh(planned, config, &source, &manifest) {
+                    other_mesh()
+                } else if let Some(table) = manifest.tables.iter().find(|table| !self.has_table(table)) {
+                    State::Other(format!("the B–H table `{}` has changed since", table.path))
+                } else {
+                    State::Finished(result.stop_reason)
                 }
             }
             // Whether the file has changed is checked by the run that is resumed.
@@ -113,7 +120,15 @@ impl<'a> States<'a> {
         };
         path.clone_from(now);
         let is_that = || run::current_mesh_hash(&config, source).is_ok_and(|own| own.blake3 == *blake3);
-        *self.meshes.entry((now.clone(), blake3.clone())).or_insert_with(is_that)
+        *self.files.entry((now.clone(), blake3.clone())).or_insert_with(is_that)
+    }
+
+    /// Whether a file still has the content that a run read.
+    fn has_table(&mut self, FileHash { path, blake3 }: &FileHash) -> bool {
+        let is_that = || {
+            self.disk.read(Path::new(path), LARGEST_TABLE).is_ok_and(|bytes| blake3_hex(&bytes) == *blake3)
+        };
+        *self.files.entry((PathBuf::from(path), blake3.clone())).or_insert_with(is_that)
     }
 }
 

@@ -96,8 +96,5 @@ impl ThicknessBound {
 /// Whether a node opposite is a design node, or one that the elastic map decides.
 fn opposite_moves(shape: &Shape, thickness: &WallThickness) -> bool {
     let (map, designed) = (shape.motion().map(), shape.surface().nodes());
-    thickness
-        .opposite_faces()
-        .flatten()
-        .any(|n| designed.binary_search(&n).is_ok() || (0..3).any(|component| map.is_unknown(n, component)))
+    thickness.opposite_faces().flatten().any(|n| designed.binary_search(&n).is_ok() || map.is_unknown(n))
 }

@@ -42,7 +42,7 @@ impl Cut {
         let nodes = mesh.topology().tet(element);
         let row = |node: &NodeId| surface.nodes().binary_search(node).ok();
         let rows: Vec<usize> = nodes.iter().filter_map(row).collect();
-        let is_held = |node: &&NodeId| row(node).is_none() && (0..3).all(|c| !map.is_unknown(**node, c));
+        let is_held = |node: &&NodeId| row(node).is_none() && !map.is_unknown(**node);
         // Beside the surface rather than in front of it: on the level of a design node, as far as the element goes.
         let levels = |row: usize| {
             let (at, direction) = (mesh.point(surface.nodes()[row]), surface.directions()[row]);

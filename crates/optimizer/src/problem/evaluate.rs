@@ -441,18 +441,14 @@ fn solve_nonlinear(
     Ok((system, state))
 }
 
-/// dF/dx with the components zeroed that cannot move.
+/// dF/dx without the parts along which nodes cannot move.
 fn moved_only(shape: &Shape, mut nodal: Vec<Point>) -> Vec<Point> {
     for (i, g) in nodal.iter_mut().enumerate() {
         let node = NodeId::new(i);
         if shape.surface().nodes().binary_search(&node).is_ok() {
             continue;
         }
-        for (component, g) in g.iter_mut().enumerate() {
-            if !shape.motion().map().is_unknown(node, component) {
-                *g = 0.0;
-            }
-        }
+        *g = shape.motion().map().unknown_part(node, *g);
     }
     nodal
 }

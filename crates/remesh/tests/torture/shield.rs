@@ -76,7 +76,8 @@ fn is_within_limit(motion: &Motion, design: &[Point]) -> bool {
         map.design_nodes().iter().copied().zip(design.iter().map(|u| u[2])).collect();
     for node in mesh.topology().nodes() {
         let [x, y, z] = mesh.point(node);
-        let known = design.get(&node).copied().or((!map.is_unknown(node, 2)).then_some(0.0));
+        let known =
+            design.get(&node).copied().or((map.unknown_part(node, [0.0, 0.0, 1.0])[2] == 0.0).then_some(0.0));
         columns.entry([x.to_bits(), y.to_bits()]).or_default().push((z, known.map(|u| z + u)));
     }
     columns.into_values().all(|mut column| {

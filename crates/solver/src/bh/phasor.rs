@@ -8,12 +8,12 @@
 //! `a` and `c` are the singular values of the matrix `[Re B, Im B]`, and `H` is the gradient of `W = w(a) + w(c)`, which is convex as `w`
 //! is and even (Lewis, J. Convex Anal. 2 (1995) 173): the derivative is symmetric over the real numbers, and positive.
 
+use fluxmorph_geometry::directions::tangents;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, cross, dot, norm};
 
 use super::{BhCurve, Tangent};
 use crate::element::Complex3;
-use crate::fixed_directions::tangents;
 
 /// `|B·B|` over `BᴴB` below which the field turns in a circle, whose axes may be any.
 const ROUND: f64 = 1e-13;

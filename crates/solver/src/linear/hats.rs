@@ -13,12 +13,12 @@
 //! strip of 92 000 unknowns in a box 13 times as long as wide, and as many as there are layers 72 in place of 64 on a plate that is
 //! askew. Cells are cut into six tetrahedra, on which hats are linear (H. Freudenthal, Ann. of Math. 43 (1942) 580): four a node.
 
+use fluxmorph_geometry::directions::Frame;
 use fluxmorph_geometry::fem::{CsrMatrix, DofMap};
 use fluxmorph_geometry::tet4::{Point, dot, norm};
 use fluxmorph_geometry::{CarrierId, NodeId, eigen_decomposition};
 
 use super::aggregation::Aggregates;
-use crate::fixed_directions::Frame;
 
 /// The largest reluctivity over the smallest from which hats pay. On a plate of 51 000 and 210 000 unknowns factor, state and adjoint
 /// take 1.19 and 1.13 of the time with aggregates alone at 3, 0.98 and 1.02 at 10, 0.76 and 0.67 at 100.

@@ -6,14 +6,13 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use fluxmorph_geometry::directions::extend;
+use fluxmorph_geometry::directions::{extend, tangents};
 use fluxmorph_geometry::tet4::{FACES, Point};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 
 use super::plane::{Condition, Plane};
 use crate::boundary::Boundary;
-use crate::fixed_directions::tangents;
 
 /// Planes of one named surface, at most: a surface of more of them is curved.
 const MOST_PLANES: usize = 6;

@@ -1,26 +1,33 @@
 //! An element matrix in node-local (rotated) coordinates: `R_aᵀ K_ab R_b`, with the axes of a node's frame as the columns of
-//! `R`; `ψ` is untouched.
+//! `R`; components after the third, such as `ψ`, are untouched.
 
-use fluxmorph_geometry::fem::{LocalMatrix, c64};
+use std::ops::Mul;
 
-use crate::fixed_directions::Frame;
+use crate::directions::Frame;
+use crate::fem::{LocalMatrix, Scalar};
 
 /// An element matrix in the local frames of its nodes; `None` stands for the coordinate axes.
-pub(crate) struct RotatedMatrix<'a, L, const N: usize> {
+#[derive(Clone, Debug)]
+pub struct RotatedMatrix<'a, L, const N: usize> {
     matrix: L,
     frames: [Option<&'a Frame>; N],
 }
 
 impl<'a, L, const N: usize> RotatedMatrix<'a, L, N> {
+    /// The matrix, and the frames of its nodes.
     #[inline]
-    pub(crate) fn new(matrix: L, frames: [Option<&'a Frame>; N]) -> Self {
+    pub fn new(matrix: L, frames: [Option<&'a Frame>; N]) -> Self {
         Self { matrix, frames }
     }
 }
 
-impl<L: LocalMatrix<c64, N, 4>, const N: usize> LocalMatrix<c64, N, 4> for RotatedMatrix<'_, L, N> {
+impl<T, L, const N: usize, const C: usize> LocalMatrix<T, N, C> for RotatedMatrix<'_, L, N>
+where
+    T: Scalar + Mul<f64, Output = T>,
+    L: LocalMatrix<T, N, C>,
+{
     #[inline]
-    fn block(&self, a: usize, b: usize) -> [[c64; 4]; 4] {
+    fn block(&self, a: usize, b: usize) -> [[T; C]; C] {
         let mut block = self.matrix.block(a, b);
         if let Some(frame) = self.frames[a] {
             let rows = block;
