@@ -52,6 +52,7 @@ pub(crate) use references::functionals;
 pub(crate) use refined::RefinedMesh;
 pub use skin::{Audited, PermeabilityOf};
 pub(crate) use skin::{audit_in_field, least_thickness, result_warnings, warnings as skin_warnings};
+pub(crate) use soundness::overlap_warning;
 pub(crate) use truncation::Truncation;
 
 use std::collections::BTreeMap;

@@ -168,7 +168,7 @@ pub(super) fn warnings(
     );
     warnings.extend(super::forces::warnings(config, mesh, coils));
     warnings.extend(phase_warnings(config));
-    warnings.extend(component_warnings(config, (mesh, &free)));
+    warnings.extend(homogeneity_warnings(config, (mesh, &free)));
     warnings.extend(unit_hint(config, mesh));
     warnings
 }
@@ -371,13 +371,26 @@ pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
     area.map(|component| component / norm(area))
 }
 
-/// What to say of the homogeneity of a component that is another one in the images of its region: the mean is not the device's.
-fn component_warnings(config: &Config, (mesh, free): (&Mesh, &HashSet<[NodeId; 3]>)) -> Vec<String> {
+/// What to say of the homogeneity of a component that is another one in the images of its region, and of the vector behind a side at
+/// which no image is counted: the mean is not the device's.
+fn homogeneity_warnings(config: &Config, (mesh, free): (&Mesh, &HashSet<[NodeId; 3]>)) -> Vec<String> {
     let of = |(path, own): (String, &Functional)| {
-        let is_component = own.kind == ObjectiveKind::Homogeneity
-            && own.compare.is_none_or(|compared| compared == Compared::Component);
-        let (direction, name) = (own.direction.filter(|_| is_component)?, own.region.as_ref()?);
+        let is_homogeneity = own.kind == ObjectiveKind::Homogeneity;
+        let name = own.region.as_ref().filter(|_| is_homogeneity)?;
         let region = mesh.topology().region(name).ok()?;
+        let is_of_vectors = own.compare.map_or(own.direction.is_none(), |own| own == Compared::Vector);
+        if is_of_vectors {
+            let outer = mesh.topology().outer_faces(region);
+            return outer.into_iter().any(|face| free.contains(&face_key(face))).then(|| {
+                format!(
+                    "{path}: `{name}` ends at an outer side without condition, and what is computed is the deviation of the meshed part \
+                     from its own mean: images are counted behind surfaces of [boundaries] alone; name that side in flux_normal, with \
+                     which the field is the same"
+                )
+            });
+        }
+        let is_component = own.compare.is_none_or(|compared| compared == Compared::Component);
+        let direction = own.direction.filter(|_| is_component)?;
         let Turning { surface, .. } = turning_surfaces(config, (mesh, free), region, direction).next()?;
         Some(format!(
             "{path}: behind {surface} the images of `{name}` have another component along this direction, and what is computed is the \

@@ -10,7 +10,7 @@ use fluxmorph_geometry::soundness::{
 };
 use fluxmorph_geometry::tet4::{self, centroid, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{Facet, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 
 use super::entries::material;
 use super::open;
@@ -176,6 +176,23 @@ pub(super) fn faces_of<'a>(
 ) -> HashSet<[NodeId; 3]> {
     let surfaces = names.into_iter().filter_map(|name| topology.surface(name).ok());
     surfaces.flatten().map(|nodes| face_key(*nodes)).collect()
+}
+
+/// A design that moves a wall of a body which is no part of the mesh through another wall of it: elements do not notice.
+pub(crate) fn overlap_warning(config: &Config, full_mesh: &Mesh, moved: &Mesh) -> Option<String> {
+    let topology = full_mesh.topology();
+    let designed = faces_of(topology, config.design.as_ref()?.surface.iter().map(String::as_str));
+    let is_wall = |facet: &Facet| facet.outside.is_none() && designed.contains(&face_key(facet.nodes));
+    topology.facets().iter().any(is_wall).then_some(())?;
+    let hull = Hull::new(moved);
+    let found = contacts(&hull, &vec![false; hull.faces().len()]);
+    let overlap = found.iter().find(|contact| contact.meeting == Meeting::Overlapping)?;
+    Some(format!(
+        "the design surface has passed through another wall at {}, and the mesh overlaps itself: nothing is left there of the body \
+         between them, and no number of this design means anything; take bounds that leave some of it, or mesh the body as a \
+         region, with model = \"perfect\" or \"impedance\", of which bounds are checked",
+        millimetres(overlap.place)
+    ))
 }
 
 fn contact_fault(source: &SourceMap, mesh: &Mesh, contact: &Contact) -> Diagnostic {

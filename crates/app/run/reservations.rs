@@ -16,8 +16,8 @@ use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 use super::excess;
 use super::reported::under;
 use crate::build::{
-    Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, multipole, result_warnings,
-    skin_warnings,
+    Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, multipole, overlap_warning,
+    result_warnings, skin_warnings,
 };
 use crate::config::{Config, Goal, RegionModel};
 use crate::error::Error;
@@ -67,6 +67,7 @@ pub(super) fn reservations(
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
     all.extend(result_warnings(config, &setup.audits, &analysis.mesh, &least.unwrap_or_default()));
     all.extend(multipole::warnings(config, problem, &analysis.mesh)?);
+    all.extend(overlap_warning(config, &setup.full_mesh, &analysis.mesh));
     Ok(all)
 }
 

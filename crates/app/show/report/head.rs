@@ -8,7 +8,7 @@ use super::markup::{Card, header};
 use super::observed;
 use super::plane::bounds;
 use super::tables::of_first_state;
-use super::ticks::{self, duration, group_digits, number, threads, trim_zeros};
+use super::ticks::{self, decimals_of, duration, group_digits, number, threads, trim_zeros};
 use super::words;
 use crate::build::Outline;
 use crate::config::Objective;
@@ -181,8 +181,11 @@ fn mean_card(data: &RunData, outline: &Outline) -> Option<Card> {
 /// Extents of the design surface and of the mesh.
 fn size_card(outline: &Outline) -> Card {
     let extents = |[low, high]: [[f64; 3]; 2]| [0, 1, 2].map(|d| high[d] - low[d]);
-    let shown =
-        |extents: &[f64]| extents.iter().map(|e| trim_zeros(1e3 * e, 1)).collect::<Vec<_>>().join(" × ");
+    let shown = |extents: &[f64]| {
+        let extents: Vec<f64> = extents.iter().map(|e| 1e3 * e).collect();
+        let decimals = decimals_of(&extents, 1);
+        extents.iter().map(|e| trim_zeros(*e, decimals)).collect::<Vec<_>>().join(" × ")
+    };
     let mesh = shown(&extents(outline.full_mesh.bounding_box()));
     let Some(design) = &outline.design else {
         return ("size", format!("{mesh} mm"), "of the whole mesh".to_owned());

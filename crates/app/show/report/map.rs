@@ -12,7 +12,7 @@ use super::frame::Frame;
 use super::moment::{Moment, place};
 use super::plane::{Plane, extremes, images, mirrored, mirrors, with_room};
 use super::plot::{LEFT, RIGHT, Scale, WIDTH, axes, colour_bar, dot, line, svg, text};
-use super::ticks::{Count, number, trim_zeros};
+use super::ticks::{Count, decimals_of, number, trim_zeros};
 use super::words::capital;
 use crate::build::{Outline, OutlinedDesign};
 use crate::config::{DesignDirection, DirectionWord};
@@ -283,7 +283,8 @@ impl Drawing {
             }
             (colour_bar(id, surface.colours(), &self.scale, &bar, self.frame.bar_top()))
         };
-        let [from, to] = [least, most].map(|end| trim_zeros(end, 2));
+        let decimals = decimals_of(&[least, most], 2);
+        let [from, to] = [least, most].map(|end| trim_zeros(end, decimals));
         let label = format!("Map of the {} {name}: from {from} to {to} millimetres", surface.name());
         svg(self.frame.height(), &label, &content)
     }
@@ -294,7 +295,7 @@ impl Drawing {
         let (class, x) = if is_left { ("spot-text end", at[0] - 6.0) } else { ("spot-text", at[0] + 6.0) };
         html! {
             (dot("spot", at, 2.2))
-            (text(class, x, at[1] + 4.0, &format!("{} mm", trim_zeros(value, 2))))
+            (text(class, x, at[1] + 4.0, &format!("{} mm", trim_zeros(value, decimals_of(&[value], 2)))))
         }
     }
 
@@ -377,16 +378,17 @@ fn caption(
     } else {
         format!("Displacement of the surface {names} along its direction of motion")
     };
+    let decimals = decimals_of(&[least, most], 2);
     if let Some(before) = &surface.values[0] {
         let [low, high] = extremes(before.iter().flatten().copied());
-        let range = if high - low < 1e-6 * high.abs().max(1e-3) {
-            format!("{} mm everywhere", trim_zeros(low, 2))
+        let range = if high - low <= 1e-6 * high.abs().max(most.abs()) {
+            format!("{} mm everywhere", trim_zeros(low, decimals))
         } else {
-            format!("{} to {} mm", trim_zeros(low, 2), trim_zeros(high, 2))
+            format!("{} to {} mm", trim_zeros(low, decimals), trim_zeros(high, decimals))
         };
         text += &format!("; before: {range}");
     }
-    text += &format!("; after: {} to {} mm. ", trim_zeros(least, 2), trim_zeros(most, 2));
+    text += &format!("; after: {} to {} mm. ", trim_zeros(least, decimals), trim_zeros(most, decimals));
     if let Some(before) = &surface.values[0] {
         let [less, more] = shares_changed(outline, design, before, after);
         let words = if surface.is_thickness {

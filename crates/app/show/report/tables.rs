@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::circuits::circuits;
 use super::data::RunData;
 use super::markup::{note, table};
-use super::ticks::{number, trim_zeros};
+use super::ticks::{decimals_of, number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline, PermeabilityOf, skin_warnings};
 use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel, Term};
@@ -46,8 +46,9 @@ fn columns<'a>(rows: &'a [Evaluation], objective: &'a str) -> Vec<(&'a str, Cell
         (title, Box::new(cell))
     }
     let thickness = |row: &Evaluation| {
-        let [low, high] = [row.min_thickness_m?, row.max_thickness_m?].map(|t| trim_zeros(1e3 * t, 2));
-        Some(format!("{low}–{high}"))
+        let [low, high] = [row.min_thickness_m?, row.max_thickness_m?].map(|t| 1e3 * t);
+        let decimals = decimals_of(&[low, high], 2);
+        Some(format!("{}–{}", trim_zeros(low, decimals), trim_zeros(high, decimals)))
     };
     let mut all = vec![
         column("evaluation", |row| row.evaluation.to_string()),

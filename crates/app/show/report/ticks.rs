@@ -119,6 +119,13 @@ pub(crate) fn trim_zeros(value: f64, decimals: usize) -> String {
     minus(if text == "-0" { "0" } else { text })
 }
 
+/// So many decimals, and more where the largest of some values shows less than two digits by them.
+pub(super) fn decimals_of(values: &[f64], usual: usize) -> usize {
+    let largest = values.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+    let needed = if largest > 0.0 { (1.0 - largest.log10().floor()).clamp(0.0, 12.0) as usize } else { 0 };
+    usual.max(needed)
+}
+
 /// So many threads.
 pub(super) fn threads(count: usize) -> String {
     if count == 1 { "1 thread".to_owned() } else { format!("{count} threads") }

@@ -1,6 +1,6 @@
 //! The configuration in plain words.
 
-use super::ticks::{given, number, trim_zeros};
+use super::ticks::{decimals_of, given, number, trim_zeros};
 use crate::config::{
     Algorithm, Compared, Config, Constraint, DesignDirection, DirectionWord, Follow, Functional, Goal, Limit,
     ObjectiveKind, ValueBound, Weighting,
@@ -121,7 +121,8 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
             None => format!("along ({})", vector.map(|c| trim_zeros(c, 3)).join(", ")),
         },
     };
-    let [lower, upper] = [design.lower, design.upper].map(|bound| trim_zeros(1e3 * bound, 3));
+    let decimals = decimals_of(&[1e3 * design.lower, 1e3 * design.upper], 3);
+    let [lower, upper] = [design.lower, design.upper].map(|bound| trim_zeros(1e3 * bound, decimals));
     let mut text = format!("by moving {} {along} between {lower} and {upper} mm", design.surface.join(", "));
     if let Some(variables) = variables {
         text += &format!(" with {variables} variables");
@@ -130,7 +131,10 @@ pub(super) fn design(config: &Config, variables: Option<usize>) -> Option<String
         (Some([n, m]), _) => text += &format!(" (control grid {n} × {m})"),
         (None, Some(0.0)) => text += " (one a node)",
         (None, Some(radius)) => {
-            text += &format!(" (nodes, filtered over {} mm)", trim_zeros(1e3 * radius, 3))
+            text += &format!(
+                " (nodes, filtered over {} mm)",
+                trim_zeros(1e3 * radius, decimals_of(&[1e3 * radius], 3))
+            )
         }
         (None, None) => text += " (nodes, filtered over 1.5 cells)",
     }
@@ -156,7 +160,9 @@ pub(super) fn constraint(constraint: &Constraint) -> String {
         Limit::Thickness { minimum, maximum, .. } => {
             let bounds = [("at least", minimum), ("at most", maximum)];
             let words = bounds.iter().filter_map(|(word, bound)| {
-                bound.map(|bound| format!("{word} {} mm", trim_zeros(1e3 * bound, 3)))
+                bound.map(|bound| {
+                    format!("{word} {} mm", trim_zeros(1e3 * bound, decimals_of(&[1e3 * bound], 3)))
+                })
             });
             format!("a thickness of {}", words.collect::<Vec<_>>().join(" and "))
         }
