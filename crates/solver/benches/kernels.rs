@@ -163,7 +163,9 @@ fn loops(criterion: &mut Criterion<CpuTime>, order: Order, refinement: f64) {
         b.iter(|| adjoint::node_gradient(&model, &mesh, &state, &state, &elements));
     });
     group.bench_function("flux densities", |b| b.iter(|| state.flux_densities(&model, &mesh)));
-    group.bench_function("current densities", |b| b.iter(|| state.current_densities(&model, &mesh)));
+    group.bench_function("current densities", |b| {
+        b.iter(|| state.current_densities_of(&model, &mesh, &elements))
+    });
     group.bench_function("losses", |b| b.iter(|| state.losses(&model, &mesh)));
     let energy = Functional::energy(&model, None).expect("the mesh is not empty");
     group.bench_function("energy functional", |b| b.iter(|| energy.evaluate(&model, &mesh, &state)));

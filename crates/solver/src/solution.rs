@@ -202,12 +202,7 @@ impl FieldSolution {
         elements.par_iter().map(|&e| self.flux_density(model, mesh, e)).collect()
     }
 
-    /// `J = −jωσ(A + ∇ψ)` [A/m²] at the centroid of every element, shape `(n_tets, 3)`.
-    pub fn current_densities(&self, model: &FieldModel, mesh: &Mesh) -> Vec<Complex3> {
-        self.current_densities_of(model, mesh, &all(model))
-    }
-
-    /// `J` [A/m²] at the centroids of some elements, in their order, shape `(n, 3)`.
+    /// `J = −jωσ(A + ∇ψ)` [A/m²] at the centroids of some elements, in their order, shape `(n, 3)`.
     pub fn current_densities_of(
         &self,
         model: &FieldModel,

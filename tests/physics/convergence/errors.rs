@@ -2,8 +2,9 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::{Point, Tet4, centroid};
+use fluxmorph_geometry::tet4::{Point, Tet4, centroid, point_at};
 use fluxmorph_solver::element::Complex3;
+use fluxmorph_solver::element::quadrature::degree_5;
 use fluxmorph_solver::linear::{LinearSolver, LinearSolverSettings, Method};
 use fluxmorph_solver::recovery::recovered_flux_density;
 use fluxmorph_solver::unknowns::PSI;
@@ -11,7 +12,6 @@ use fluxmorph_solver::{
     Boundary, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Material, Order,
 };
 
-use super::quadrature::{point_in, tet_rule};
 use crate::meshes::Distortion;
 use crate::orders::Study;
 
@@ -66,7 +66,7 @@ fn eddy(model: &FieldModel) -> Vec<c64> {
 /// The second term stands in its weak form: it then holds for any current through the conductor's surface, and its sum
 /// over all q is zero, as grounding ψ in one node requires.
 fn load(field: &impl KnownField, model: &FieldModel, mesh: &Mesh) -> Vec<c64> {
-    let (rule, eddy) = (tet_rule(), eddy(model));
+    let (rule, eddy) = (degree_5(), eddy(model));
     let nodal = model.space().family() == ElementFamily::Nodal;
     let topology = mesh.topology();
     let mut load = vec![c64::default(); model.unknown_count()];
@@ -74,8 +74,8 @@ fn load(field: &impl KnownField, model: &FieldModel, mesh: &Mesh) -> Vec<c64> {
         let vertices = mesh.vertices(e);
         let (cell, inside) = (model.space().cell(mesh, e), centroid(vertices));
         let sigma = eddy[topology.region_of()[e.index()].index()];
-        for &(bary, weight) in &rule {
-            let known = field.at(point_in(vertices, bary), inside);
+        for &(bary, weight) in rule {
+            let known = field.at(point_at(&vertices, &bary), inside);
             let weight = weight * cell.tet.volume;
             let drive: Complex3 =
                 std::array::from_fn(|d| sigma * (known.vector_potential[d] + known.scalar_gradient[d]));
@@ -105,7 +105,7 @@ struct Errors {
 }
 
 fn errors(field: &impl KnownField, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Errors {
-    let (rule, eddy) = (tet_rule(), eddy(model));
+    let (rule, eddy) = (degree_5(), eddy(model));
     let topology = mesh.topology();
     let distance = |x: Complex3, y: Complex3| (0..3).map(|d| (x[d] - y[d]).norm_sqr()).sum::<f64>();
     let zero = [c64::default(); 3];
@@ -120,8 +120,8 @@ fn errors(field: &impl KnownField, model: &FieldModel, mesh: &Mesh, solution: &F
             sums[3][0] += tet.volume * distance(recovered, exact);
             sums[3][1] += tet.volume * distance(exact, zero);
         }
-        for &(bary, weight) in &rule {
-            let known = field.at(point_in(vertices, bary), inside);
+        for &(bary, weight) in rule {
+            let known = field.at(point_at(&vertices, &bary), inside);
             let weight = weight * tet.volume;
             let computed = solution.at(model, mesh, e, &bary);
             let exact_drive = std::array::from_fn(|d| known.vector_potential[d] + known.scalar_gradient[d]);

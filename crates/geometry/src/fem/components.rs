@@ -91,11 +91,6 @@ impl ComponentAnalysis {
         Ok(Arc::new(Self { blocks, component }))
     }
 
-    /// Number of components that have unknowns.
-    pub fn block_count(&self) -> usize {
-        self.blocks.len()
-    }
-
     /// The blocks that share a factor: those of one pattern.
     fn groups(&self) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();

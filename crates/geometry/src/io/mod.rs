@@ -14,5 +14,5 @@ pub use regular::{open_regular, read_at_most};
 pub use stl::stl_bytes;
 pub use vtu::{
     ArrayData, Field, VtuArray, VtuContents, VtuPiece, join_pieces, pvtu_pieces, pvtu_text, read_vtu,
-    vtu_bytes, vtu_bytes_at, vtu_contents, write_vtu,
+    vtu_bytes, vtu_bytes_at, vtu_contents,
 };

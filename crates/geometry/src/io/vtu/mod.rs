@@ -17,7 +17,7 @@ use crate::tet4::Point;
 pub use join::join_pieces;
 pub use piece::{VtuPiece, pvtu_text};
 pub use reader::{pvtu_pieces, read_vtu, vtu_contents};
-pub use writer::{vtu_bytes, vtu_bytes_at, write_vtu};
+pub use writer::{vtu_bytes, vtu_bytes_at};
 
 /// The values of one array to be written, one entry a node or an element.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,6 @@
 //! array never gets a block size that divides its length, and the question does not come up.
 
 use std::fmt::Write as _;
-use std::io::Write;
 use std::ops::Range;
 
 use base64::Engine;
@@ -148,19 +147,6 @@ fn push_attributes(text: &mut String, name: &str, kind: &str, components: usize)
     push_escaped(text, name);
     *text += "\" NumberOfComponents=\"";
     *text += if components == 3 { "3\"" } else { "1\"" };
-}
-
-/// Writes what [`vtu_bytes`] makes.
-///
-/// # Errors
-/// As [`vtu_bytes`], and [`MeshError::Vtu`] if the writer fails.
-pub fn write_vtu(
-    mut writer: impl Write,
-    mesh: &Mesh,
-    point_data: &[Field<'_>],
-    cell_data: &[Field<'_>],
-) -> Result<(), MeshError> {
-    writer.write_all(&vtu_bytes(mesh, point_data, cell_data)?).map_err(refused)
 }
 
 /// An array of the file.
