@@ -56,35 +56,37 @@ fn cut_winding_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option
     if !body.regions.iter().any(|name| is_wound(config, name)) {
         return None;
     }
-    let cut = cutting_surface(config, mesh, body, |_| true)?;
+    let cuts = cutting_surfaces(config, mesh, body, |_| true)?;
+    let (cuts, verb) = (cuts.join(" and "), if cuts.len() == 1 { "cuts" } else { "cut" });
     Some(format!(
-        "{cut} cuts the winding `{}`: its force across that, as the axial one of half a winding, is the one on the free faces of the \
+        "{cuts} {verb} the winding `{}`: its force across that, as the axial one of half a winding, is the one on the free faces of the \
          meshed part, without the stress in the cut, and not the J × B of its turns; mesh the whole winding for it",
         body.name
     ))
 }
 
-/// The surface that cuts a body, in words: one with a condition before one without; of faces that count.
-fn cutting_surface(
+/// The surfaces that cut a body, in words: those with a condition before one without; of faces that count.
+fn cutting_surfaces(
     config: &Config,
     mesh: &Mesh,
     body: &ForceBody,
     counts: impl Fn(&[NodeId; 3]) -> bool,
-) -> Option<String> {
+) -> Option<Vec<String>> {
     let topology = mesh.topology();
     let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
     let outside: Vec<[NodeId; 3]> =
         regions.flat_map(|region| topology.outer_faces(region)).filter(|face| counts(face)).collect();
-    let named = config.boundaries.surfaces().find(|surface| {
+    let cuts = |surface: &&String| {
         let faces = faces_of(topology, [surface.as_str()]);
         outside.iter().any(|face| faces.contains(&face_key(*face)))
-    });
-    // Where no surface was found, none of them has a condition.
-    let natural = || {
-        let place = millimetres(centroid(outside.first()?.map(|node| mesh.point(node))));
-        Some(format!("the outer face at {place}, which has no condition,"))
     };
-    named.map(|surface| format!("the surface `{surface}`")).or_else(natural)
+    let named = config.boundaries.surfaces().filter(cuts).map(|surface| format!("the surface `{surface}`"));
+    let named: Vec<String> = named.collect();
+    if !named.is_empty() {
+        return Some(named);
+    }
+    let place = millimetres(centroid(outside.first()?.map(|node| mesh.point(node))));
+    Some(vec![format!("the outer face at {place}, which has no condition,")])
 }
 
 /// What to say of forces and torques that are sought across a plane which cuts their body: of these only a part is computed.
@@ -107,7 +109,7 @@ fn cut_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
             let (area, v) = (area_vector(corners), velocity(centroid(corners)));
             dot(v, area).abs() > INCLINED * norm(v) * norm(area)
         };
-        if let Some(surface) = cutting_surface(config, mesh, body, goes_across) {
+        if let Some([surface, ..]) = cutting_surfaces(config, mesh, body, goes_across).as_deref() {
             let of_magnet = if body.regions.iter().any(|name| is_magnet(config, name)) {
                 "; of a magnet it comes from the singular field beside the cut, and its error bar is far too small"
             } else {

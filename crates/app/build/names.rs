@@ -91,6 +91,10 @@ fn names(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagno
     let regions: Vec<&str> = topology.region_names().iter().map(String::as_str).collect();
     let mut region = |path: String, name: &str| match topology.region(name) {
         _ if name.is_empty() => {}
+        Err(_) if topology.surface(name).is_ok() => {
+            let fault = source.diagnostic(&path, format!("`{name}` is a surface, and no region"));
+            faults.push(fault.expected(format!("one of the regions {}", regions.join(", "))));
+        }
         Err(_) => faults.push(source.unknown_name(&path, "region", name, &regions)),
         Ok(id) if is_empty(topology, id) => {
             let fault = source.diagnostic(&path, format!("the region `{name}` has no elements"));

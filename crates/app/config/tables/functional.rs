@@ -375,6 +375,11 @@ impl Functional {
             ("load", None, kind.is_of_field()),
         ] {
             match (section.has(key), example) {
+                (true, _) if !wanted && key == "direction" && is_homogeneity => {
+                    let message =
+                        format!("`{}.direction` belongs to compare = \"component\"", section.path());
+                    section.wrong(key, message, "no such key, or another compare");
+                }
                 (true, _) if !wanted => {
                     let message =
                         format!("`{}.{key}` has no use for the kind `{}`", section.path(), kind.name());

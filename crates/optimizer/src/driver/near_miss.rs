@@ -13,9 +13,12 @@ use crate::error::Error;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
 use crate::objective::Goal;
 
-/// Relative excess over a bound up to which a design is one of these: few bounds are meant more exactly, and few meshes are that
-/// exact.
-const NEAR: f64 = 1e-3;
+/// Relative excess over a bound up to which a design is one of these: from farther away a step back to first order loses too much
+/// of what was found.
+const NEAR: f64 = 1e-2;
+
+/// Relative gain that a step back is worth where the best design keeps the bounds.
+const WORTH: f64 = 1e-3;
 
 /// How far within the bounds the step aims, as a share of the excess: bounds are curved, by far less than this over such a step.
 const MARGIN: f64 = 0.01;
@@ -56,7 +59,7 @@ impl NearMiss {
     /// excess.
     pub(super) fn gain(&self, goal: Goal, (violation, best): (f64, f64)) -> Option<f64> {
         let gain = goal.sign() * (best - self.objective) / best.abs();
-        (violation > 0.0 || gain > NEAR.max(100.0 * self.worst.1)).then_some(gain)
+        (violation > 0.0 || gain > WORTH.max(100.0 * self.worst.1)).then_some(gain)
     }
 
     /// A design near it that keeps all constraints, to first order, and the bounds of the variables; `None` where none is found.

@@ -129,7 +129,8 @@ pub enum Ending {
     Objective,
     /// From a start that violates constraints it has come to designs that keep them: it is to begin anew from the best one.
     ///
-    /// MMA and CCSAQ weight what is violated by up to 10⁴⁰, and keep the weight once nothing is: they stop moving.
+    /// MMA and CCSAQ weight what is violated by up to 10⁴⁰, and keep the weight once nothing is: they walk away from the bound, or
+    /// stop moving.
     Entered,
     /// Rounding allows no further step.
     Roundoff,
@@ -276,6 +277,8 @@ const SETTLED: usize = 100;
 enum Interruption<E> {
     /// The method asks for the same design again and again.
     Settled,
+    /// It has come to a worse design after one that kept all constraints that its start violates.
+    Entered,
     Error(E),
 }
 
@@ -296,8 +299,8 @@ struct Bridge<'a, F, E> {
     asked: usize,
     /// Whether the start violates constraints.
     began_outside: Option<bool>,
-    /// From such a start, whether a design has kept all.
-    has_entered: bool,
+    /// From such a start, the least value of a design that kept all.
+    entered: Option<f64>,
     guard: PanicGuard,
     interruption: Option<Interruption<E>>,
 }
@@ -314,7 +317,7 @@ impl<'a, F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'a, F, E>
             last: None,
             asked: 0,
             began_outside: None,
-            has_entered: false,
+            entered: None,
             guard: PanicGuard::default(),
             interruption: None,
         }
@@ -335,8 +338,9 @@ impl<'a, F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'a, F, E>
         self.guard.resume();
         match (self.interruption, ended) {
             (Some(Interruption::Settled), _) => Outcome::Ended(Ending::Step),
+            (Some(Interruption::Entered), _) => Outcome::Ended(Ending::Entered),
             (Some(Interruption::Error(error)), _) => Outcome::Interrupted(error),
-            (None, Some(Ok(_))) if self.has_entered => Outcome::Ended(Ending::Entered),
+            (None, Some(Ok(_))) if self.entered.is_some() => Outcome::Ended(Ending::Entered),
             (None, Some(ended)) => outcome(ended),
             (None, None) => Outcome::Failed("the first design was not evaluated"),
         }
@@ -401,7 +405,15 @@ impl<'a, F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'a, F, E>
                 Ok(sample) => {
                     let keeps_all = sample.violation() == 0.0;
                     let began_outside = *self.began_outside.get_or_insert(!keeps_all);
-                    self.has_entered |= began_outside && keeps_all;
+                    if began_outside && keeps_all {
+                        let keeps_its_weight =
+                            matches!(self.settings.algorithm, Algorithm::Mma | Algorithm::Ccsaq);
+                        if keeps_its_weight && self.entered.is_some_and(|least| sample.value >= least) {
+                            self.interruption = Some(Interruption::Entered);
+                        }
+                        self.entered =
+                            Some(self.entered.map_or(sample.value, |least| least.min(sample.value)));
+                    }
                     self.last = Some((x.to_vec(), sample));
                 }
                 Err(error) => self.interruption = Some(Interruption::Error(error)),

@@ -359,18 +359,26 @@ fn constraints_are_kept_from_inside_and_from_outside() {
     for algorithm in CONSTRAINED {
         for start in [0.0, 0.015] {
             let settings = Minimisation { constraints: 2, ..settings(algorithm) };
-            let (mut best, mut seen) = ((f64::INFINITY, vec![]), Vec::new());
-            let outcome = minimise::<Halt>(&settings, &[start; 8], |p| {
-                assert!(!seen.contains(&p.to_vec()), "{algorithm:?}: a design is evaluated once");
-                seen.push(p.to_vec());
-                let sample = constrained(p);
-                let feasible = sample.constraints.iter().all(|c| c.0 <= CONSTRAINT_TOLERANCE);
-                if feasible && sample.value < best.0 {
-                    best = (sample.value, p.to_vec());
-                }
-                Ok(sample)
-            });
+            let mut best = (f64::INFINITY, vec![start; 8]);
+            let search = |from: &[f64], best: &mut (f64, Vec<f64>)| {
+                let mut seen = Vec::new();
+                minimise::<Halt>(&settings, from, |p| {
+                    assert!(!seen.contains(&p.to_vec()), "{algorithm:?}: a design is evaluated once");
+                    seen.push(p.to_vec());
+                    let sample = constrained(p);
+                    let feasible = sample.constraints.iter().all(|c| c.0 <= CONSTRAINT_TOLERANCE);
+                    if feasible && sample.value < best.0 {
+                        *best = (sample.value, p.to_vec());
+                    }
+                    Ok(sample)
+                })
+            };
+            let mut outcome = search(&[start; 8], &mut best);
             let has_entered = matches!(outcome, Outcome::Ended(Ending::Entered));
+            if has_entered {
+                let from = best.1.clone();
+                outcome = search(&from, &mut best);
+            }
             assert!(matches!(outcome, Outcome::Ended(_)), "{algorithm:?}: {outcome:?}");
             assert_eq!(has_entered, start > 0.0, "{algorithm:?}: {outcome:?}");
             let p = &best.1;
