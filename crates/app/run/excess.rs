@@ -51,7 +51,8 @@ pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<Strin
         let [(_, why, cure), ..] = reasons;
         format!(
             "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}, \
-             and no error bar counts that. Where its loss matters, mesh it (model = \"volume\"){cure}",
+             and no error bar counts that. Where its loss matters, or the field in a bore or slit \
+             of a few skin depths, mesh it (model = \"volume\"){cure}",
             found.region,
             100.0 * found.share().abs(),
             Readable(model.setup().frequency),

@@ -22,8 +22,8 @@ table! {
     /// `direction = "normal"` moves every node along the area-weighted normal of the undeformed surface, out of the body, so
     /// that a positive displacement makes the body thicker. The body is the side with a `[regions]` table; where both sides
     /// have one, or neither, it is the first region of a surface named `first|second`. Behind an outer face of air lies a body
-    /// that is not meshed. A node on a surface of `[boundaries]` or of `remesh.slide` moves within that surface's plane; where
-    /// two such planes meet, along their edge.
+    /// that is not meshed. A node on a surface of `[boundaries]` or of `remesh.slide`, or on another plane side of the mesh, moves
+    /// within that plane; where two such planes meet, along their edge.
     ///
     /// Where faces of the surface meet at more than 42 degrees, their edge moves so that each of them is displaced by the same
     /// length along its own normal: by √2 of the displacement at an edge of 90 degrees, √3 in the corner of a cube, and never

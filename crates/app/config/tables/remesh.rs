@@ -44,8 +44,7 @@ table! {
         stiffness: Option<StiffnessLaw> = WORD;
         /// Which way nodes may move. The default is the paper's elasticity.
         motion: Motion = WORD => Motion::Free;
-        /// Surfaces whose nodes stay in their plane, which is normal to x, y or z. On an oblique symmetry plane nodes stay by
-        /// `fixed`, or by a motion along it.
+        /// Surfaces whose nodes stay in their planes, at any angle: the sides of a sector among them. A curved surface cannot slide.
         slide: Vec<String> = NAMES => Vec::new();
         /// Surfaces whose nodes stay. The body's outside, and faces between two regions inside it, are fixed where nothing else
         /// is said.
