@@ -93,6 +93,18 @@ fn another_mesh_in_the_same_file_is_noticed() {
     home.sweep("out", &set).with(5, &["holds another run: its mesh file is another, or has changed since"]);
 }
 
+#[test]
+fn another_curve_in_the_same_file_is_noticed() {
+    let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
+    let home = Home::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
+    home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
+    let set = ["--set", "design.upper=2 mm,3 mm", "--max-evaluations", "1"];
+    home.sweep("out", &set).with(1, &[]);
+    assert_eq!(home.sweep("out", &set).with(1, &[]).count("skipped"), 2);
+    home.edit("iron.csv", "0.5", "0.4");
+    home.sweep("out", &set).with(5, &["holds another run: the B–H table `", "iron.csv` has changed since"]);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn killed_runs_go_on_and_end_as_if_they_had_not_been() {

@@ -59,11 +59,11 @@ fn fold(text: &str) -> String {
     text.to_lowercase().replace(['-', ' ', '.'], "_")
 }
 
-/// Whether every word of a name starts the word of the candidate at the same place: `min_qual` for `minimum_quality`, `freq`
-/// for `frequency`. Fewer than three letters say too little.
+/// Whether the words of a name start words of the candidate, in their order: `min_qual` for `minimum_quality`, `freq` for
+/// `frequency`, `permeability` for `relative_permeability`. Fewer than three letters say too little.
 fn abbreviates(name: &str, candidate: &str) -> bool {
     let mut words = candidate.split('_');
-    name.split('_').all(|short| short.len() >= 3 && words.next().is_some_and(|long| long.starts_with(short)))
+    name.split('_').all(|short| short.len() >= 3 && words.any(|long| long.starts_with(short)))
 }
 
 #[cfg(test)]
@@ -90,6 +90,7 @@ mod tests {
         let names = ["frequency", "minimum_quality", "max_evaluations"];
         assert_eq!(nearest("freq", names), Some("frequency"));
         assert_eq!(nearest("min_quality", names), Some("minimum_quality"));
+        assert_eq!(nearest("quality", names), Some("minimum_quality"));
         assert_eq!(nearest("fr", names), None);
     }
 

@@ -20,8 +20,11 @@ const NEAR: f64 = 1e-2;
 /// Relative gain that a step back is worth where the best design keeps the bounds.
 const WORTH: f64 = 1e-3;
 
-/// How far within the bounds the step aims, as a share of the excess: bounds are curved, by far less than this over such a step.
+/// How far within the bounds the step aims, as a share of the excess at least.
 const MARGIN: f64 = 0.01;
+
+/// How much farther, by the square of the excess: bounds are curved, by 30 times that for the aggregated thickness of a wall.
+const CURVATURE: f64 = 50.0;
 
 /// Projections onto the bounds in turn, most: few hold a design at a time.
 const SWEEPS: usize = 50;
@@ -64,7 +67,7 @@ impl NearMiss {
 
     /// A design near it that keeps all constraints, to first order, and the bounds of the variables; `None` where none is found.
     fn stepped_back(&self, lower: &[f64], upper: &[f64]) -> Option<Vec<f64>> {
-        let margin = CONSTRAINT_TOLERANCE.max(MARGIN * self.worst.1);
+        let margin = CONSTRAINT_TOLERANCE.max((MARGIN + CURVATURE * self.worst.1) * self.worst.1);
         let mut p = self.design.clone();
         for _ in 0..SWEEPS {
             let mut is_within = true;
