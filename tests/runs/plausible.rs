@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use crate::support::device::written;
 use crate::support::folder::{RunFolder, list, number, read_text};
 use crate::support::program::{command, finish, folder};
 use crate::support::repository;
@@ -398,6 +399,22 @@ fn a_design_that_no_field_sees_is_asked_about() {
     assert!(at("analysis.frequency=0").contains(said));
     assert!(!at("analysis.frequency=60").contains(said), "it conducts");
     assert!(!check(&[]).contains(said), "an impedance surface is none of air");
+}
+
+#[test]
+fn matter_that_a_design_brings_into_an_expansion_is_named() {
+    let home = folder();
+    let set =
+        "multipoles=[{name=\"ball\", shape=\"ball\", center=[0, 0, \"12 mm\"], radius=\"6 mm\", order=2}]";
+    let said = |initial: &str| {
+        let initial = format!("design.initial={initial}");
+        let mut solve = written("block", home.path(), &[]).command("solve", &home.path().join("out"));
+        finish(solve.args(["--force", "--set", set, "--set", &initial])).exits_with(0).stderr
+    };
+    let warning =
+        "the ball of the expansion `ball` holds a material with another permeability than air, at (";
+    assert!(said("4 mm").contains(warning), "{}", said("4 mm"));
+    assert!(!said("1 mm").contains(warning));
 }
 
 #[test]

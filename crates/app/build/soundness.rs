@@ -279,3 +279,34 @@ fn patch_fault(source: &SourceMap, patch: &OpenPatch, text: String) -> Diagnosti
     };
     source.diagnostic("boundaries", text).expected(expected).help(help)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::build_mesh;
+
+    /// A plate of 10 mm that is left out of the mesh, and its lower face moved upwards.
+    #[test]
+    fn a_wall_that_passes_through_another_one_is_named() {
+        let text = "[mesh]\ngenerator = \"boxes\"\n[mesh.boxes]\nbox = [[0, 0, 0], [0.03, 0.03, 0.05]]\n\
+                    [[mesh.boxes.regions]]\nname = \"plate\"\nbox = [[0, 0, 0.02], [0.02, 0.02, 0.03]]\ncells = [2, 2, 1]\n\
+                    [[mesh.boxes.surfaces]]\nname = \"face\"\nbox = [[0, 0, 0.02], [0.02, 0.02, 0.02]]\n\
+                    [analysis]\nfrequency = 0\n[design]\nsurface = \"face\"\ndirection = [0, 0, 1]\nlower = 0\nupper = 0.02\n\
+                    [remesh]\nregion = \"air\"\n[objective]\nkind = \"energy\"\n";
+        let (config, source) = Config::from_str(text, "device.toml").expect("sound");
+        let whole = build_mesh(&config, &source).expect("a mesh");
+        let plate = whole.topology().region("plate").expect("a region");
+        let (mesh, _) = whole.without_region(plate).expect("air is left");
+        let moved = |height: f64| {
+            let place = |&[x, y, z]: &[f64; 3]| {
+                let is_of_face = (z - 0.02).abs() < 1e-9 && x < 0.019 && y < 0.019;
+                [x, y, if is_of_face { z + height } else { z }]
+            };
+            let points = mesh.points().iter().map(place).collect();
+            overlap_warning(&config, &mesh, &Mesh::new(mesh.topology().clone(), points).expect("sound"))
+        };
+        assert_eq!(moved(0.008), None);
+        let said = moved(0.012).expect("it is beyond the upper face");
+        assert!(said.contains("has passed through another wall at"), "{said}");
+    }
+}

@@ -171,6 +171,7 @@ pub(super) struct QualitySummary {
 pub(super) struct SkinSummary {
     pub(super) region: String,
     pub(super) model: &'static str,
+    pub(super) frequency_hz: f64,
     pub(super) skin_depth_m: f64,
     /// Of iron with a B–H curve: the depth is that of its largest permeability, this one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -186,6 +187,7 @@ impl SkinSummary {
         Self {
             region: audit.region.clone(),
             model: audited.model.name(),
+            frequency_hz: audited.frequency,
             skin_depth_m: audit.skin_depth,
             largest_permeability: (audited.permeability_of == PermeabilityOf::LargestOfCurve)
                 .then_some(audit.relative_permeability),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use fluxmorph_geometry::Millimetres;
+use fluxmorph_geometry::{Millimetres, Readable};
 use fluxmorph_optimizer::design::GridSide;
 
 use super::estimate::{ConstraintError, EstimateSummary};
@@ -386,7 +386,12 @@ fn skin_table(summary: &Summary<'_>) -> Table<5> {
         ("elements per depth", Right),
         ("2V/S in depths", Right),
     ]);
+    let has_several = summary.skin.iter().any(|s| s.frequency_hz != summary.skin[0].frequency_hz);
     for s in &summary.skin {
+        let conductor = match has_several {
+            true => format!("{} at {} Hz", s.region, Readable(s.frequency_hz)),
+            false => s.region.clone(),
+        };
         let elements = if s.model == RegionModel::Volume.name() {
             format!("{:.2} (least {:.2})", s.median_elements_per_skin_depth, s.least_elements_per_skin_depth)
         } else {
@@ -395,7 +400,7 @@ fn skin_table(summary: &Summary<'_>) -> Table<5> {
         let unsaturated = if s.largest_permeability.is_some() { " unsaturated" } else { "" };
         let depth = format!("{:.3}{unsaturated}", Millimetres(s.skin_depth_m));
         let thickness = format!("{:.1}", s.thickness_in_skin_depths);
-        table.row([s.region.clone(), s.model.to_owned(), depth, elements, thickness]);
+        table.row([conductor, s.model.to_owned(), depth, elements, thickness]);
     }
     table
 }

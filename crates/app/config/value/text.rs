@@ -185,7 +185,9 @@ impl<T: Choice> Value<Word> for T {
             entry.former(former, now);
         }
         if found.is_none() {
-            let message = format!("`{}` cannot be `{}`", entry.path, shown(&word));
+            let is_axis = entry.path.ends_with("direction") && matches!(&*word, "x" | "y" | "z");
+            let hint = if is_axis { ", an axis is a vector such as [0, 0, 1]" } else { "" };
+            let message = format!("`{}` cannot be `{}`{hint}", entry.path, shown(&word));
             entry.unknown(message, &word, &words::<T>());
         }
         found

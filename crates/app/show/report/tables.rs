@@ -308,8 +308,10 @@ pub(super) fn skin(outline: &Outline, result: Option<&RunResult>) -> Markup {
     if outline.audits.is_empty() {
         return html! { p { "No region conducts at a frequency above zero: there are no skin depths to resolve." } };
     }
+    let has_several = outline.audits.iter().any(|own| own.frequency != outline.audits[0].frequency);
     let row = |audited: &Audited| {
         let a = &audited.audit;
+        let at = if has_several { format!(" at {}", hertz(audited.frequency)) } else { String::new() };
         let model = match audited.model {
             RegionModel::Volume => "meshed",
             RegionModel::Impedance => "surface impedance",
@@ -320,7 +322,7 @@ pub(super) fn skin(outline: &Outline, result: Option<&RunResult>) -> Markup {
         let [median, least] =
             [a.median_elements_per_skin_depth, a.least_elements_per_skin_depth].map(|n| number(n, 3));
         vec![
-            a.region.clone(),
+            format!("{}{at}", a.region),
             model.to_owned(),
             format!("{}{unsaturated}", number(1e3 * a.skin_depth, 3)),
             if audited.model == RegionModel::Volume {
