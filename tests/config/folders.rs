@@ -198,7 +198,7 @@ fn texts_are_neither_executed_nor_expanded() {
         let mesh = crate::support::repository_text("tests/config/bases/of_file.toml")
             .replace("\"device.msh\"", &format!("{:?}", format!("{text}.msh")));
         write(home.path(), "device.toml", mesh);
-        check(home.path(), &[]).refuses(5, &["cannot read", &format!("{text}.msh")]);
+        check(home.path(), &[]).refuses(3, &["there is no file", &format!("{text}.msh")]);
         assert_holds(home.path(), &names);
     }
 }

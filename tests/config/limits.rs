@@ -243,7 +243,7 @@ fn what_is_no_regular_file_is_not_waited_for() {
         ("to_pipe", 5, "a pipe"),
         ("socket", 5, "a socket"),
         ("folder.toml", 5, "a folder"),
-        ("none.msh", 5, "cannot read"),
+        ("none.msh", 3, "there is no file"),
         ("round", 3, "leads nowhere"),
         ("dead", 3, "leads nowhere"),
     ] {

@@ -44,8 +44,11 @@ pub(super) fn surface(
     let outer = |t: &[NodeId; 3]| facets.get(&face_key(*t)).is_some_and(|facet| facet.outside.is_none());
     let cuts = kept.iter().copied().filter(outer).collect();
     let nodes: BTreeSet<NodeId> = triangles.iter().flatten().copied().collect();
-    let sides = sides(mesh, |node| nodes.contains(&node)).into_iter().map(|(triangle, _)| triangle);
-    kept.extend(sides.filter(|t| !own.contains(&face_key(*t))));
+    let sides =
+        sides(mesh, |face| face.iter().any(|node| nodes.contains(node)) && !own.contains(&face_key(face)))
+            .into_iter()
+            .map(|(triangle, _)| triangle);
+    kept.extend(sides);
     let setup = DesignSetup {
         direction: match design.direction {
             DesignDirection::Vector(direction) => Direction::Along(direction),

@@ -13,6 +13,7 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetre
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
+use super::held::sides;
 use super::references::functionals;
 use super::soundness::{faces_of, faces_without_condition, size};
 use super::thin_windings::{self, section};
@@ -380,8 +381,9 @@ fn homogeneity_warnings(config: &Config, (mesh, free): (&Mesh, &HashSet<[NodeId;
         let region = mesh.topology().region(name).ok()?;
         let is_of_vectors = own.compare.map_or(own.direction.is_none(), |own| own == Compared::Vector);
         if is_of_vectors {
-            let outer = mesh.topology().outer_faces(region);
-            return outer.into_iter().any(|face| free.contains(&face_key(face))).then(|| {
+            let outer: HashSet<_> = mesh.topology().outer_faces(region).into_iter().map(face_key).collect();
+            let is_free = |face| outer.contains(&face_key(face)) && free.contains(&face_key(face));
+            return (!sides(mesh, is_free).is_empty()).then(|| {
                 format!(
                     "{path}: `{name}` ends at an outer side without condition, and what is computed is the deviation of the meshed part \
                      from its own mean: images are counted behind surfaces of [boundaries] alone; name that side in flux_normal, with \

@@ -17,7 +17,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::directions::{FixedDirections, Frame, axis_of, extend, unit};
-use fluxmorph_geometry::tet4::{FACES, Point, area_vector, centroid, cross, norm};
+use fluxmorph_geometry::tet4::{FACES, Point, area_vector, centroid, cross, dot, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 use rayon::prelude::*;
@@ -25,8 +25,9 @@ use rayon::prelude::*;
 use crate::deform::RemeshSetup;
 use crate::error::RemeshError;
 
-/// Sine of the largest angle between faces of one plane: coordinates in files carry 6 or more digits.
-const NORMAL_TOLERANCE: f64 = 1e-6;
+/// Sine of the largest angle between faces of one plane: coordinates in files carry 6 or more digits, faces are a hundredth of
+/// the mesh, and some of them thin.
+const FLAT: f64 = 1e-3;
 
 /// Sine of the angle between faces of a sliding surface below which it counts as curved, and not as two planes: 25 degrees,
 /// coarser than the facets of most meshes.
@@ -165,9 +166,14 @@ impl NodeConditions {
         let mut basis: Vec<Point> = along_axes.collect();
         normals.for_each(|normal| extend(&mut basis, normal, NEW));
         let FixedDirections { frame, fixed } = FixedDirections::spanned_by(&basis);
-        *held = fixed;
+        // Each axis in the place of the coordinate that it is nearest to: preconditioners couple components with their like.
+        let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        let nearness = |order: &[usize; 3]| (0..3).map(|d| frame.axes[order[d]][d].abs()).sum::<f64>();
+        let order =
+            orders.into_iter().max_by(|a, b| nearness(a).total_cmp(&nearness(b))).unwrap_or(orders[0]);
+        *held = (0..3).filter(|&d| fixed >> order[d] & 1 == 1).fold(0, |bits, d| bits | 1 << d);
         if frame != Frame::COORDINATES && !self.is_design[node.index()] {
-            self.frames.insert(node, frame);
+            self.frames.insert(node, Frame { axes: order.map(|k| frame.axes[k]) });
         }
     }
 
@@ -255,31 +261,40 @@ impl FaceRules {
         let mut design_nodes = Vec::new();
         for boundary in boundaries {
             let list = || format!("the surface `{}`", boundary.name);
-            let mut used = false;
-            let mut planes = Vec::new();
-            for &triangle in &boundary.triangles {
-                check_nodes(&list(), &triangle, mesh.topology().node_count())?;
+            for triangle in &boundary.triangles {
+                check_nodes(&list(), triangle, mesh.topology().node_count())?;
+            }
+            let is_face = |triangle: &&[NodeId; 3]| {
+                faces.binary_search_by_key(&face_key(**triangle), |face| face.0).is_ok()
+            };
+            let used: Vec<[NodeId; 3]> = boundary.triangles.iter().filter(is_face).copied().collect();
+            // What the design prescribes need not be flat: an optimum goes on as a mesh.
+            let slides = |triangle: &[NodeId; 3]| {
+                boundary.kind == BoundaryKind::Slide && !triangle.iter().all(|n| is_design[n.index()])
+            };
+            let planes = planes(mesh, boundary, used.iter().copied().filter(slides))?;
+            let places: Vec<usize> = planes.iter().map(|area| place_among(&mut normals, *area)).collect();
+            for &triangle in &used {
                 let key = face_key(triangle);
-                if faces.binary_search_by_key(&key, |face| face.0).is_err() {
-                    continue;
-                }
-                used = true;
                 let rule = match boundary.kind {
                     BoundaryKind::Design => {
                         design_nodes.extend(triangle);
                         continue;
                     }
                     BoundaryKind::Fixed => Rule::Fixed,
-                    // What the design prescribes need not be flat: an optimum goes on as a mesh.
-                    BoundaryKind::Slide if triangle.iter().all(|n| is_design[n.index()]) => continue,
                     BoundaryKind::Slide => {
-                        Rule::Slide(plane(mesh, (boundary, triangle), &mut planes, &mut normals)?)
+                        let area = area_vector(triangle.map(|n| mesh.point(n)));
+                        let angles = planes.iter().map(|plane| sine(*plane, area)).enumerate();
+                        match angles.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(plane, _)| plane) {
+                            Some(plane) if slides(&triangle) => Rule::Slide(places[plane]),
+                            _ => continue,
+                        }
                     }
                     BoundaryKind::Free => Rule::Free,
                 };
                 rules.push((key, rule));
             }
-            if !used {
+            if used.is_empty() {
                 let (surface, kind) = (boundary.name.clone(), boundary.kind.name());
                 return Err(RemeshError::SurfaceElsewhere { surface, kind });
             }
@@ -297,31 +312,39 @@ impl FaceRules {
     }
 }
 
-/// The plane of a sliding triangle, by its place among all `normals`; `planes` are those of the surface before.
-fn plane(
+/// The planes of a sliding surface: sums of the area vectors of their triangles.
+fn planes(
     mesh: &Mesh,
-    (boundary, triangle): (&Boundary, [NodeId; 3]),
-    planes: &mut Vec<usize>,
-    normals: &mut Vec<Point>,
-) -> Result<usize, RemeshError> {
-    let vertices = triangle.map(|n| mesh.point(n));
-    let normal = unit(area_vector(vertices));
-    let angle = |k: usize| norm(cross(normals[k], normal));
-    if let Some(&known) = planes.iter().find(|&&k| angle(k) <= NORMAL_TOLERANCE) {
-        return Ok(known);
+    boundary: &Boundary,
+    triangles: impl Iterator<Item = [NodeId; 3]>,
+) -> Result<Vec<Point>, RemeshError> {
+    let mut sums: Vec<Point> = Vec::new();
+    for vertices in triangles.map(|triangle| triangle.map(|n| mesh.point(n))) {
+        let area = area_vector(vertices);
+        if let Some(sum) = sums.iter_mut().find(|sum| sine(**sum, area) <= FLAT) {
+            let sign = dot(*sum, area).signum();
+            *sum = std::array::from_fn(|d| sum[d] + sign * area[d]);
+        } else if sums.iter().any(|sum| sine(*sum, area) < CURVED) {
+            let (surface, centroid, normal) = (boundary.name.clone(), centroid(vertices), unit(area));
+            return Err(RemeshError::SlideCurved { surface, centroid, normal });
+        } else {
+            sums.push(area);
+        }
     }
-    if planes.iter().any(|&k| angle(k) < CURVED) {
-        return Err(RemeshError::SlideCurved {
-            surface: boundary.name.clone(),
-            centroid: centroid(vertices),
-            normal,
-        });
-    }
-    let known = axis_of(normal).or_else(|| (3..normals.len()).find(|&k| angle(k) <= NORMAL_TOLERANCE));
-    let plane = known.unwrap_or_else(|| {
+    Ok(sums)
+}
+
+/// The place of a normal among all; it is added where it is a new one.
+fn place_among(normals: &mut Vec<Point>, area: Point) -> usize {
+    let normal = unit(area);
+    let known = axis_of(normal).or_else(|| (3..normals.len()).find(|&k| normals[k] == normal));
+    known.unwrap_or_else(|| {
         normals.push(normal);
         normals.len() - 1
-    });
-    planes.push(plane);
-    Ok(plane)
+    })
+}
+
+/// Sine of the angle between two lines.
+fn sine(a: Point, b: Point) -> f64 {
+    norm(cross(unit(a), unit(b)))
 }

@@ -275,14 +275,9 @@ impl Unknowns {
         &self.harmonic
     }
 
-    /// Carriers with a prescribed part of `A`, ascending.
+    /// Carriers with a prescribed part of `A`, which belongs to where they lie, so that they must not move; ascending.
     pub fn prescribed_carriers(&self) -> impl Iterator<Item = CarrierId> + '_ {
         self.prescribed.keys().copied()
-    }
-
-    /// Carriers whose directions or prescribed values belong to where they lie: these must not move.
-    pub fn held_carriers(&self) -> impl Iterator<Item = CarrierId> + '_ {
-        self.frames.keys().chain(self.prescribed.keys()).copied()
     }
 
     /// Nodes on conditioned planes along the axes, and bits of the axes that these are at right angles to: along them

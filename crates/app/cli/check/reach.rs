@@ -49,7 +49,8 @@ impl Reach {
             (0..3).filter_map(move |d| {
                 let side = if to[d] > from[d] { upper[d] } else { lower[d] };
                 let (way, room) = ((to[d] - from[d]).abs(), (side - point[d] - from[d]).abs());
-                (way > room + rounding).then_some((room / way, node))
+                // What lies there already is the outside itself, and moves it.
+                (way > room + rounding && room > rounding).then_some((room / way, node))
             })
         });
         let (share, node) = shares.min_by(|a, b| a.0.total_cmp(&b.0))?;

@@ -44,13 +44,12 @@ pub fn move_mesh(setup: &MotionSetup) -> Result<MovedMesh, Error> {
     let (displacement, reached, newton_steps) = match motion.law() {
         MotionLaw::Linear => (motion.displacement(&setup.path.at(1.0))?, 1.0, 0),
         MotionLaw::Rails(_) | MotionLaw::Hyperelastic => {
-            let at_once = (!setup.path.winds()).then(|| motion.moved(&setup.path.at(1.0)));
-            let (reached, moved) = match at_once {
-                None | Some(Err(RemeshError::Inverted { .. } | RemeshError::NotSettled { .. })) => {
+            let (reached, moved) = match motion.moved(&setup.path.at(1.0)) {
+                Err(RemeshError::Inverted { .. } | RemeshError::NotSettled { .. }) => {
                     let Carried { share, moved, .. } = motion.carried_along(&|t| setup.path.at(t))?;
                     (share, moved)
                 }
-                Some(moved) => (1.0, moved?),
+                moved => (1.0, moved?),
             };
             (moved.displacement, reached, moved.newton_steps)
         }

@@ -3,8 +3,6 @@
 //! A rotation turns by `t` times its angle, so that a node walks along its arc: the straight line to its end would
 //! shrink the body on the way, by half for 120 degrees.
 
-use std::f64::consts::PI;
-
 use fluxmorph_geometry::NodeId;
 use fluxmorph_geometry::tet4::{Point, cross, dot, norm};
 
@@ -94,11 +92,6 @@ impl Path {
         self.motions.iter().map(of).collect()
     }
 
-    /// Whether a rotation goes on beyond half a turn, so that its end alone does not say which way it came.
-    pub fn winds(&self) -> bool {
-        self.transforms.iter().any(|transform| transform.rotation.2.abs() > PI)
-    }
-
     /// Length of the longest displacement at the end of the path [m].
     pub fn largest(&self) -> f64 {
         self.at(1.0).into_iter().map(norm).fold(0.0, f64::max)
@@ -107,6 +100,8 @@ impl Path {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::PI;
+
     use super::*;
 
     #[test]

@@ -6,7 +6,7 @@
 use serde::Serialize;
 
 use super::Setting;
-use crate::config::{Combination, Config, Constraint, Limit, Objective, Term, ValueBound};
+use crate::config::{Combination, Config, Constraint, Functional, Limit, Objective, Term, ValueBound};
 use crate::files::RunResult;
 
 /// What runs are compared by.
@@ -27,10 +27,10 @@ pub struct Criterion {
 enum Measured {
     /// That of all runs: values of different ones say nothing.
     Objective(Box<Objective>),
-    /// The term with this number.
-    Term(usize),
-    /// The constraint with this name.
-    Constraint(String),
+    /// The term with this number, and what it is of.
+    Term(usize, Box<Functional>),
+    /// The constraint with this name, and what it is of.
+    Constraint(String, Option<Box<Functional>>),
 }
 
 impl Criterion {
@@ -90,7 +90,7 @@ impl Criterion {
             name: name_of(term),
             unit: if unit == "1" { "" } else { unit },
             smaller_is_better: objective.goal.sign() * term.weight > 0.0,
-            of: Measured::Term(k),
+            of: Measured::Term(k, Box::new(term.functional.clone())),
         }
     }
 
@@ -107,7 +107,10 @@ impl Criterion {
             name: constraint.name.clone(),
             unit: if unit == "1" { "" } else { unit },
             smaller_is_better,
-            of: Measured::Constraint(constraint.name.clone()),
+            of: Measured::Constraint(
+                constraint.name.clone(),
+                constraint.limit.functional().cloned().map(Box::new),
+            ),
         })
     }
 
@@ -116,8 +119,8 @@ impl Criterion {
         let objective = result.objective.as_ref();
         let value = match &self.of {
             Measured::Objective(_) => objective?.best,
-            Measured::Term(k) => objective?.terms.get(*k)?.value,
-            Measured::Constraint(name) => {
+            Measured::Term(k, _) => objective?.terms.get(*k)?.value,
+            Measured::Constraint(name, _) => {
                 result.constraints.iter().find(|constraint| constraint.name == *name)?.value
             }
         };

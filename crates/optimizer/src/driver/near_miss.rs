@@ -227,7 +227,7 @@ mod tests {
             let sample = Sample { constraints: vec![(excess, vec![1.0])], ..Sample::default() };
             NearMiss::of(&Record { design: vec![0.0], ..Record::default() }, &sample)
         };
-        assert!(of(1e-7).is_none() && of(2e-3).is_none());
+        assert!(of(1e-7).is_none() && of(2e-2).is_none());
         let miss = NearMiss { objective: 0.9, ..of(1e-4).expect("near") };
         assert_eq!(miss.gain(Goal::Maximise, (0.0, 1.0)), None);
         assert!((miss.gain(Goal::Minimise, (0.0, 1.0)).expect("a gain") - 0.1).abs() < 1e-15);
