@@ -9,10 +9,9 @@ use crate::config::table::{Group, one_of, table};
 use crate::config::tables::axis::{Axis, check_axis};
 use crate::config::tables::order::{Corners, flat_box};
 use crate::config::value::choice::choice;
-use crate::config::value::range::Range;
 
-/// Angles up to half a turn, with what degrees are rounded by [rad].
-const HALF_A_TURN: Range = Range::closed(-3.1416, 3.1416);
+/// Half a turn, with what degrees are rounded by [rad].
+const HALF_A_TURN: f64 = 3.1416;
 
 table! {
     /// Nodes and their motion. Exactly one of `surface`, `line`, `nodes`, `box` and `design` says which nodes; later motions
@@ -117,9 +116,19 @@ table! {
         center: [f64; 3] = length(FINITE) => [0.0; 3];
         /// Right-handed angle [rad], at most half a turn: the mesh is that of the end of a motion, which the shorter way round has
         /// alike.
-        angle: f64 = quantity(Angle, HALF_A_TURN), need "\"45 deg\"";
+        angle: f64 = quantity(Angle, FINITE), need "\"45 deg\"";
     }
-    check = |rotation, section| check_axis(rotation.axis, section);
+    check = Rotation::check;
+}
+
+impl Rotation {
+    fn check(&mut self, section: &Section<'_>) {
+        check_axis(self.axis, section);
+        if self.angle.abs() > HALF_A_TURN {
+            let message = format!("`{}.angle` is {:.1} degrees", section.path(), self.angle.to_degrees());
+            section.wrong("angle", message, "at most half a turn: the shorter way round ends alike");
+        }
+    }
 }
 
 table! {
