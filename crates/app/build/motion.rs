@@ -18,6 +18,9 @@ use crate::config::{
 use crate::error::Error;
 use crate::run::morph::path::{NodeMotion, Path, Transform};
 
+/// Half a turn, with what degrees are rounded by [rad].
+const HALF_A_TURN: f64 = 3.1416;
+
 /// How far from a line, box or point of the configuration a node may lie, as a share of the mesh's diagonal:
 /// coordinates in mesh files carry 6 digits or more, and no cell is a millionth of the mesh.
 const NEAR: f64 = 1e-6;
@@ -60,6 +63,12 @@ fn build_motion(config: &Config, source: &SourceMap) -> Result<MotionSetup, Erro
         if let Target::Design(design) = &motion.target {
             moved.extend(design_motion(config, source, &path, design, &full_mesh, &mesh)?);
             continue;
+        }
+        if let Some(angle) = motion.rotation.map(|own| own.angle).filter(|angle| angle.abs() > HALF_A_TURN) {
+            let key = format!("{path}.rotation.angle");
+            let message = format!("`{key}` is {:.1} degrees", angle.to_degrees());
+            let expected = "at most half a turn: the shorter way round ends alike";
+            faults.push(source.diagnostic(&key, message).expected(expected));
         }
         match nodes_of(source, &path, &motion.target, &mesh) {
             Ok(nodes) => {

@@ -126,6 +126,7 @@ impl SourceMap {
         names.sort();
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let help = offer(&name, names.iter().map(String::as_str));
-        Diagnostic { help, ..self.diagnostic(path, format!("there is no file `{}`", file.display())) }
+        let fault = self.diagnostic(path, format!("there is no file `{}`", file.display()));
+        Diagnostic { help, ..fault.expected("the path of a file, from the folder of the configuration") }
     }
 }

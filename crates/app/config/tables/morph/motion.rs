@@ -10,9 +10,6 @@ use crate::config::tables::axis::{Axis, check_axis};
 use crate::config::tables::order::{Corners, flat_box};
 use crate::config::value::choice::choice;
 
-/// Half a turn, with what degrees are rounded by [rad].
-const HALF_A_TURN: f64 = 3.1416;
-
 table! {
     /// Nodes and their motion. Exactly one of `surface`, `line`, `nodes`, `box` and `design` says which nodes; later motions
     /// win at nodes of several. All three components of such a node are prescribed. A node belongs to a line, box or point up
@@ -118,17 +115,7 @@ table! {
         /// alike.
         angle: f64 = quantity(Angle, FINITE), need "\"45 deg\"";
     }
-    check = Rotation::check;
-}
-
-impl Rotation {
-    fn check(&mut self, section: &Section<'_>) {
-        check_axis(self.axis, section);
-        if self.angle.abs() > HALF_A_TURN {
-            let message = format!("`{}.angle` is {:.1} degrees", section.path(), self.angle.to_degrees());
-            section.wrong("angle", message, "at most half a turn: the shorter way round ends alike");
-        }
-    }
+    check = |rotation, section| check_axis(rotation.axis, section);
 }
 
 table! {
