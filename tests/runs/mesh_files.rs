@@ -132,7 +132,8 @@ fn a_device_that_is_turned_has_the_same_optimum() {
         let bytes = msh_bytes(&mesh.expect("the same elements"), 1e-3, MshEncoding::Ascii).expect("finite");
         fs::write(home.path().join("device.msh"), bytes).expect("written");
         let out = home.path().join("out");
-        let further = ["--force", "--max-evaluations", "3", "--set", "output.fields=none"];
+        let edge = "analysis.elements=edge";
+        let further = ["--force", "--max-evaluations", "3", "--set", "output.fields=none", "--set", edge];
         finish(command(&[&"run", &config, &"--out", &out]).args(further)).exits_with(1);
         let result = RunFolder(out).result();
         (number(&result, "/objective/initial"), number(&result, "/objective/ratio"))
