@@ -7,13 +7,16 @@ use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, s
 use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_remesh::ElasticMap;
-use fluxmorph_solver::FieldModel;
+use fluxmorph_solver::{ElementFamily, FieldModel};
 
 use super::shape::{Inputs, may_move};
 use crate::config::Diagnostic;
 
 /// Sine of the angle to a plane up to which a direction is along it: files carry few digits, and their facets differ by that.
 const ALONG: f64 = 1e-3;
+
+/// Cosine of the angle between faces below which nodal elements take them for one surface, 40 degrees.
+const SMOOTH: f64 = 0.766;
 
 /// Distance from a plane up to which a node lies in it, by the diagonal of the mesh, beside what [`ALONG`] allows.
 const IN_PLANE: f64 = 1e-7;
@@ -81,7 +84,15 @@ pub(super) fn held_node_fault(
         Some(i) => dot(surface.directions()[i], normal).abs() > ALONG * norm(surface.directions()[i]),
         None => norm(map.unknown_part(node, normal)) > ALONG,
     };
-    if let Some((node, _)) = unknowns.oblique_nodes().iter().find(|(node, normal)| leaves(*node, *normal)) {
+    let oblique = unknowns.oblique_nodes();
+    // Where nodal elements take faces for one smooth surface, directions follow the areas of these.
+    let is_smoothed = |own: &&[(NodeId, Point)]| {
+        let turns = |a: Point, b: Point| norm(cross(a, b)) > ALONG && dot(a, b) > SMOOTH;
+        let has_pair = own.iter().any(|a| own.iter().any(|b| turns(a.1, b.1)));
+        space.family() == ElementFamily::Nodal && moves(own[0].0) && has_pair
+    };
+    let smoothed = || oblique.chunk_by(|a, b| a.0 == b.0).find(is_smoothed).map(|own| &own[0]);
+    if let Some((node, _)) = oblique.iter().find(|(node, normal)| leaves(*node, *normal)).or_else(smoothed) {
         return Some(leaves_its_surface(inputs, inputs.mesh.point(*node)));
     }
     let of_planes = unknowns.plane_nodes().find_map(|(node, axes)| {

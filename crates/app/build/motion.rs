@@ -3,6 +3,7 @@
 //! No field problem is set up: `[coils]`, `[boundaries]` and the rest are not looked at.
 
 use std::collections::BTreeMap;
+use std::f64::consts::PI;
 
 use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
@@ -19,7 +20,7 @@ use crate::error::Error;
 use crate::run::morph::path::{NodeMotion, Path, Transform};
 
 /// Half a turn, with what degrees are rounded by [rad].
-const HALF_A_TURN: f64 = 3.1416;
+const HALF_A_TURN: f64 = PI * (1.0 + 1e-6);
 
 /// How far from a line, box or point of the configuration a node may lie, as a share of the mesh's diagonal:
 /// coordinates in mesh files carry 6 digits or more, and no cell is a millionth of the mesh.
