@@ -6,7 +6,7 @@
 //! and go further (`equilibrium`): `rails` for designs along one axis, with the energy of `barrier`, and `hyperelastic` for all
 //! others, with that of `neo_hooke`. [`motion`] is the mesh of a design by one of them, and `carried` how far it goes. Who moves
 //! freely, slides or stays is decided in [`boundary`], the stiffness in [`subregion`] and [`policy`], the fictitious force `f` in
-//! [`force`]. [`guard`] says how far a motion may go before the first element inverts, and refuses an inverted mesh.
+//! `force`. [`guard`] says how far a motion may go before the first element inverts, and refuses an inverted mesh.
 
 mod barrier;
 mod body;
