@@ -7,8 +7,8 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, millimetres};
 
 use super::entries::material;
-use super::plausible::{INCLINED, beside, normal};
-use super::soundness::faces_of;
+use super::plausible::{INCLINED, beside};
+use super::soundness::{faces_of, normal};
 use crate::config::{Config, Diagnostic, RegionModel, SourceMap};
 
 /// Faults of an applied field that lies along a surface which it can only cross at right angles, beside one where it is given: nothing

@@ -2,21 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::directions::{Frame, unit};
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
+use fluxmorph_geometry::directions::Frame;
+use fluxmorph_geometry::tet4::{Point, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_remesh::ElasticMap;
-use fluxmorph_solver::{ElementFamily, FieldModel};
+use fluxmorph_solver::FieldModel;
 
 use super::shape::{Inputs, may_move};
+use super::soundness::normal;
 use crate::config::Diagnostic;
 
 /// Sine of the angle to a plane up to which a direction is along it: files carry few digits, and their facets differ by that.
 const ALONG: f64 = 1e-3;
-
-/// Cosine of the angle between faces below which nodal elements take them for one surface, 40 degrees.
-const SMOOTH: f64 = 0.766;
 
 /// Distance from a plane up to which a node lies in it, by the diagonal of the mesh, beside what [`ALONG`] allows.
 const IN_PLANE: f64 = 1e-7;
@@ -50,8 +48,7 @@ pub(super) fn sides(mesh: &Mesh, is_wanted: impl Fn([NodeId; 3]) -> bool) -> Vec
         let vertices = nodes.map(|node| mesh.point(node));
         let lies_in = |plane: &&Plane| vertices.iter().all(|&x| plane.height(x, rounding) == 0.0);
         let known = planes.iter().position(|plane| lies_in(&plane)).unwrap_or_else(|| {
-            let mut plane =
-                Plane { normal: unit(area_vector(vertices)), at: centroid(vertices), is_side: false };
+            let mut plane = Plane { normal: normal(mesh, nodes), at: centroid(vertices), is_side: false };
             let heights = || mesh.points().iter().map(|&x| plane.height(x, rounding));
             let is_side = heights().all(|height| height <= 0.0);
             plane.is_side = is_side && heights().filter(|height| *height == 0.0).nth(3).is_some();
@@ -84,16 +81,10 @@ pub(super) fn held_node_fault(
         Some(i) => dot(surface.directions()[i], normal).abs() > ALONG * norm(surface.directions()[i]),
         None => norm(map.unknown_part(node, normal)) > ALONG,
     };
-    let oblique = unknowns.oblique_nodes();
-    // Where nodal elements take faces for one smooth surface, directions follow the areas of these.
-    let is_smoothed = |own: &&[(NodeId, Point)]| {
-        let turns = |a: Point, b: Point| norm(cross(a, b)) > ALONG && dot(a, b) > SMOOTH;
-        let has_pair = own.iter().any(|a| own.iter().any(|b| turns(a.1, b.1)));
-        space.family() == ElementFamily::Nodal && moves(own[0].0) && has_pair
-    };
-    let smoothed = || oblique.chunk_by(|a, b| a.0 == b.0).find(is_smoothed).map(|own| &own[0]);
-    if let Some((node, _)) = oblique.iter().find(|(node, normal)| leaves(*node, *normal)).or_else(smoothed) {
-        return Some(leaves_its_surface(inputs, inputs.mesh.point(*node)));
+    let oblique = unknowns.oblique_nodes().iter().find(|(node, normal)| leaves(*node, *normal));
+    let smoothed = || unknowns.smoothed_nodes().find(|&node| moves(node));
+    if let Some(node) = oblique.map(|(node, _)| *node).or_else(smoothed) {
+        return Some(leaves_its_surface(inputs, inputs.mesh.point(node)));
     }
     let of_planes = unknowns.plane_nodes().find_map(|(node, axes)| {
         let is_left = |&axis: &usize| axes >> axis & 1 == 1 && leaves(node, Frame::COORDINATES.axes[axis]);
@@ -131,7 +122,7 @@ fn natural_side_fault(inputs: &Inputs<'_>, leaves: impl Fn(NodeId, Point) -> boo
     for triangle in
         inputs.design.surface.iter().filter_map(|name| full.topology().surface(name).ok()).flatten()
     {
-        let normal = unit(area_vector(triangle.map(|node| full.point(node))));
+        let normal = normal(full, *triangle);
         triangle.iter().for_each(|node| own.entry(*node).or_default().push(normal));
     }
     let is_designed = |node: NodeId, normal: Point| {
@@ -142,7 +133,7 @@ fn natural_side_fault(inputs: &Inputs<'_>, leaves: impl Fn(NodeId, Point) -> boo
     };
     // What moves across its own face, before it is looked at whether that is a side.
     let is_left = |nodes: [NodeId; 3]| {
-        let normal = unit(area_vector(nodes.map(|node| full.point(node))));
+        let normal = normal(full, nodes);
         nodes.iter().any(|&node| would_leave(node, normal))
     };
     let (nodes, normal) = sides(full, is_left).into_iter().next()?;

@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
 use fluxmorph_geometry::soundness::OpenPatch;
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
+use fluxmorph_geometry::tet4::{Point, dot, norm};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
@@ -15,7 +15,7 @@ use fluxmorph_solver::coil::{self, Racetrack};
 use super::entries::material;
 use super::held::sides;
 use super::references::functionals;
-use super::soundness::{faces_of, faces_without_condition, size};
+use super::soundness::{faces_of, faces_without_condition, normal, size};
 use super::thin_windings::{self, section};
 use crate::config::{
     Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, LoadCase, MeshConfig,
@@ -364,12 +364,6 @@ fn turning_surfaces(
 /// What a unit vector with this part across a surface has along it.
 pub(super) fn beside(across: f64) -> f64 {
     (1.0 - across * across).max(0.0).sqrt()
-}
-
-/// The unit normal of a face.
-pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
-    let area = area_vector(face.map(|node| mesh.points()[node.index()]));
-    area.map(|component| component / norm(area))
 }
 
 /// What to say of the homogeneity of a component that is another one in the images of its region, and of the vector behind a side at

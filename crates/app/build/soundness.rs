@@ -4,11 +4,12 @@
 
 use std::collections::{BTreeSet, HashSet};
 
+use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::soundness::{
     Contact, Hull, Leaning, Meeting, OpenPatch, Situation, contacts, leaning_layers, open_patches,
     separate_parts,
 };
-use fluxmorph_geometry::tet4::{self, centroid, norm, sub};
+use fluxmorph_geometry::tet4::{self, Point, area_vector, centroid, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Facet, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 
@@ -176,6 +177,11 @@ pub(super) fn faces_of<'a>(
 ) -> HashSet<[NodeId; 3]> {
     let surfaces = names.into_iter().filter_map(|name| topology.surface(name).ok());
     surfaces.flatten().map(|nodes| face_key(*nodes)).collect()
+}
+
+/// The unit normal of a face.
+pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
+    unit(area_vector(face.map(|node| mesh.point(node))))
 }
 
 /// A design that moves a wall of a body which is no part of the mesh through another wall of it: elements do not notice.

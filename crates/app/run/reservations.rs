@@ -66,7 +66,10 @@ pub(super) fn reservations(
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));
     all.extend(result_warnings(config, &setup.audits, &analysis.mesh, &least.unwrap_or_default()));
-    all.extend(multipole::warnings(config, problem, &analysis.mesh)?);
+    // Where nothing moves the set-up has looked.
+    if problem.shape().is_some() {
+        all.extend(multipole::warnings(config, problem, &analysis.mesh)?);
+    }
     all.extend(overlap_warning(config, &setup.full_mesh, &analysis.mesh));
     Ok(all)
 }

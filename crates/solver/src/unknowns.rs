@@ -24,7 +24,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use fluxmorph_geometry::directions::{FixedDirections, Frame, axis_of};
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::fem::{DofMap, c64};
-use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId};
 
@@ -32,13 +32,16 @@ use crate::boundary::{self, Boundary, CONFLICT};
 use crate::element::edge::functions::{WHITNEY, is_gradient};
 use crate::elements::ElementFamily;
 use crate::error::SolverError;
-use crate::fixed_directions::{Fix, fixed_directions};
+use crate::fixed_directions::{CREASE, Fix, fixed_directions};
 use crate::gauge;
 use crate::harmonic::{self, HarmonicField};
 use crate::space::Space;
 
 /// Component index of `ψ`.
 pub const PSI: usize = 3;
+
+/// Sine of the angle between faces up to which they are one plane: coordinates in files carry few digits.
+const FLAT: f64 = 1e-3;
 
 /// Equation numbers of the A–ψ system.
 #[derive(Clone, Debug)]
@@ -292,6 +295,18 @@ impl Unknowns {
         &self.oblique
     }
 
+    /// Nodes with directions of their own at which oblique faces count as one smooth surface: the directions follow the areas of
+    /// these, so that the nodes must not move.
+    pub fn smoothed_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
+        let crease = CREASE.to_radians().cos();
+        let are_smoothed = move |a: Point, b: Point| norm(cross(a, b)) > FLAT && dot(a, b) > crease;
+        let has_pair = move |own: &[(NodeId, Point)]| {
+            own.iter().any(|(_, a)| own.iter().any(|(_, b)| are_smoothed(*a, *b)))
+        };
+        let at_nodes = self.oblique.chunk_by(|a, b| a.0 == b.0);
+        at_nodes.filter(move |own| self.frame(own[0].0.into()).is_some() && has_pair(own)).map(|own| own[0].0)
+    }
+
     /// Adds the components of a carrier, of a node `x, y, z` and ψ, into a vector of unknowns; what is fixed is dropped.
     #[inline]
     pub fn scatter_add(&self, values: &mut [c64], carrier: CarrierId, components: [c64; 4]) {
@@ -414,4 +429,36 @@ fn ground(sets: &mut DisjointSets, has_psi: &[bool], psi_zero: &[bool]) -> Vec<C
         is_fixed[sets.root(n)] = true;
     }
     nodes().filter(|&n| sets.root(n) == n && !is_fixed[n]).map(CarrierId::new).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use fluxmorph_geometry::generate::{BlockParameters, SphereParameters, block, sphere};
+
+    use super::*;
+    use crate::elements::{ElementFamily, Order};
+
+    #[test]
+    fn faces_of_a_sphere_are_smoothed_and_oblique_planes_are_not() {
+        let smoothed = |mesh: &Mesh, surfaces: &[&str]| {
+            let space = Space::new(mesh.topology(), ElementFamily::Nodal, Order::Linear);
+            let boundaries: Vec<(String, Boundary)> =
+                surfaces.iter().map(|name| ((*name).to_owned(), Boundary::FluxParallel)).collect();
+            let unknowns = Unknowns::new(mesh, &space, &Conductors::default(), &boundaries);
+            unknowns.expect("conditions that agree").smoothed_nodes().count()
+        };
+        let octant =
+            sphere(&SphereParameters { divisions: 2, ..SphereParameters::default() }).expect("sound");
+        assert!(smoothed(&octant, &["outer"]) > 0);
+        let straight =
+            block(&BlockParameters { cells: [2; 3], ..BlockParameters::default() }).expect("sound");
+        let (sine, cosine) = 0.5_f64.sin_cos();
+        let turned =
+            straight.points().iter().map(|&[x, y, z]| [cosine * x - sine * y, sine * x + cosine * y, z]);
+        let oblique =
+            Mesh::new(Arc::clone(straight.topology()), turned.collect()).expect("the same elements");
+        assert_eq!(smoothed(&oblique, &["x_min", "y_min", "z_min"]), 0);
+    }
 }

@@ -62,11 +62,11 @@ impl Criterion {
         }
         order.extend(others);
         let &[first, second, ..] = order.as_slice() else { return None };
-        let mut pair = [first.min(second), first.max(second)].map(|k| Self::of_term(objective, k));
+        let places = [first.min(second), first.max(second)];
+        let mut pair = places.map(|k| Self::of_term(objective, k));
         if pair[0].name == pair[1].name {
-            pair.iter_mut().zip([first.min(second), first.max(second)]).for_each(|(criterion, k)| {
-                criterion.name += &format!(" (term {})", k + 1);
-            });
+            let numbered = pair.iter_mut().zip(places);
+            numbered.for_each(|(criterion, k)| criterion.name += &format!(" (term {})", k + 1));
         }
         Some(pair)
     }
