@@ -3,6 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use fluxmorph_optimizer::verify::fitted_slope;
+
 use crate::case::{Record, Time};
 
 /// Writes a table between its marks of the page.
@@ -176,13 +178,9 @@ fn row(text: &mut String, cells: &[String]) {
 
 /// Slope of log quantity over log tets by least squares.
 fn exponent(records: &[&Record], quantity: &dyn Fn(&Record) -> f64) -> f64 {
-    let points: Vec<(f64, f64)> =
-        records.iter().map(|r| ((r.tets as f64).ln(), quantity(r).max(1e-9).ln())).collect();
-    let n = points.len() as f64;
-    let (x, y) = points.iter().fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
-    let covariance: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    let variance: f64 = points.iter().map(|p| (p.0 - x).powi(2)).sum();
-    covariance / variance
+    let (tets, values): (Vec<f64>, Vec<f64>) =
+        records.iter().map(|r| (r.tets as f64, quantity(r).max(1e-9))).unzip();
+    fitted_slope(&tets, &values)
 }
 
 fn seconds(s: f64) -> String {

@@ -1,5 +1,7 @@
 //! Errors over mesh sizes, and the order fitted to them.
 
+use fluxmorph_optimizer::verify::fitted_slope;
+
 /// A quantity's relative error on every mesh of a sequence.
 pub(crate) struct Study {
     what: String,
@@ -19,11 +21,8 @@ impl Study {
 
     /// The slope of the least-squares line through `(ln size, ln error)`.
     pub(crate) fn order(&self) -> f64 {
-        let logs: Vec<(f64, f64)> = self.points.iter().map(|(h, e)| (h.ln(), e.ln())).collect();
-        let n = logs.len() as f64;
-        let (mx, my) = (logs.iter().map(|p| p.0).sum::<f64>() / n, logs.iter().map(|p| p.1).sum::<f64>() / n);
-        logs.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
-            / logs.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>()
+        let (sizes, errors): (Vec<f64>, Vec<f64>) = self.points.iter().copied().unzip();
+        fitted_slope(&sizes, &errors)
     }
 
     /// The error on the last mesh.

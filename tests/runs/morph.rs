@@ -199,9 +199,12 @@ fn the_tuner_writes_a_configuration_that_repeats_what_it_found() {
     assert!(found > was + 0.05, "{was} {found}");
     assert_eq!(number(&tuned, "/cases/0/after/worst"), found);
     assert!(count(&tuned, "/tuned/evaluations") <= 4 * 26 + 1);
-    let found_again = std::fs::read_to_string(home.path().join("out/tuned.toml")).expect("written");
-    let again = morph(home.path(), &found_again, &["--json", "--force"]).exits_with(0).json();
+    let path = home.path().join("out/tuned.toml");
+    let again = fluxmorph(&[&"morph", &"--json", &path]).exits_with(0).json();
     assert_eq!(number(&again, "/cases/0/after/worst"), found);
+    assert!(home.path().join("out/tuned/after.vtu").exists(), "beside it, within its folder");
+    let hyperelastic = text.replace("poisson = 0.4", "law = \"hyperelastic\"");
+    morph(home.path(), &hyperelastic, &["--tune", "--force"]).with(3, &["`remesh.law`", "\"linear\""]);
 }
 
 #[test]

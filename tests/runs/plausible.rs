@@ -83,6 +83,9 @@ fn magnets_and_metals_that_do_not_exist_or_are_mirrored_reversed_are_warned_of()
     assert!(found.contains("\"58 MS/m\", where that is meant"), "{found}");
     assert!(check(&["materials.steel.conductivity=3.5e8"]).contains("more than any metal"));
     assert!(!check(&["materials.steel.conductivity=\"35 MS/m\""]).contains("metal"));
+    let of_density = |density: &str| check(&[&format!("materials.steel.density={density}")]);
+    assert!(of_density("7.85").contains("\"7.85 g/cm3\", where that is meant"));
+    assert!(of_density("7.85e6").contains("osmium") && !of_density("7850").contains("density"));
 }
 
 #[test]
@@ -465,4 +468,16 @@ fn degrees_without_their_unit_are_asked_about() {
     let said = "coils[0].phase is 14.3 turns: if degrees are meant";
     assert!(check(&["coils[0].phase=90"]).contains(said));
     assert!(!check(&["coils[0].phase=90 deg"]).contains("turns"));
+}
+
+/// A loss adds up over frequencies, a mean of the field does not.
+#[test]
+fn a_bound_on_a_sum_over_states_is_asked_about() {
+    let field = "constraints=[{kind=\"field_component\", region=\"observation\", direction=[0, 0, 1], upper=\"1 T\"}]";
+    let said = "bounds the sum of the field_component over 2 states, and none by itself";
+    let of = |constraint: &str| check(&["analysis.frequencies=[\"50 Hz\", \"60 Hz\"]", constraint]);
+    assert!(of(field).contains(said));
+    let of_one = field.replace("upper", "frequency=\"50 Hz\", upper");
+    let loss = "constraints=[{kind=\"loss\", region=\"plate\", upper=\"1 W\"}]";
+    assert!(!of(&of_one).contains("sum") && !of(loss).contains("sum"));
 }

@@ -67,7 +67,9 @@ impl Curves {
 
     /// What is not wrong with a curve, but seldom meant.
     pub(super) fn warnings(&self, config: &Config) -> Vec<String> {
-        let used = |name: &String| config.regions.values().any(|region| region.material == *name);
+        let used = |name: &String| {
+            config.regions.iter().any(|(region, own)| own.material == *name && config.is_meshed(region))
+        };
         let warning = |(name, curve): (&String, &Arc<BhCurve>)| {
             let [h, b] = curve.end().filter(|_| !curve.ends_saturated())?;
             Some({

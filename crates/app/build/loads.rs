@@ -92,6 +92,23 @@ fn drive_fault(
     Some(source.diagnostic(&path, message).expected("a resistance in series, and coils alone as sources"))
 }
 
+/// What to say of bounds on the sum over several states of what does not add up.
+pub(super) fn sum_warnings(config: &Config) -> Vec<String> {
+    let of = |own: &config::Constraint| {
+        let functional = own.limit.functional().filter(|own| !own.kind.adds_up_over_states())?;
+        let count = config.load_cases().iter().filter(|case| functional.is_taken_under(case)).count();
+        (count > 1).then(|| {
+            let (name, kind) = (&own.name, functional.kind.name());
+            let which = if config.loads.is_empty() { "frequency" } else { "load" };
+            format!(
+                "the constraint `{name}` bounds the sum of the {kind} over {count} states, and none by itself: give it a {which}, and \
+                 each other state a constraint of its own"
+            )
+        })
+    };
+    config.constraints.iter().filter_map(of).collect()
+}
+
 /// A load under which nothing excites a field.
 fn unexcited(config: &Config, source: &SourceMap, case: &config::LoadCase<'_>) -> Option<Diagnostic> {
     let (k, load) = case.load?;

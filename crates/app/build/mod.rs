@@ -192,6 +192,7 @@ fn problem_on(
         warnings.extend(applied::on_conductors(config, &full_mesh));
         warnings.extend(probes::warnings(config, &mesh));
         warnings.extend(functional::warnings(config));
+        warnings.extend(loads::sum_warnings(config));
         warnings.extend(elements::warnings(config, &full_mesh, &audits));
     }
     let (full, remaining, owned) = (&full_mesh, &mesh, share.as_ref());

@@ -137,7 +137,7 @@ fn nodes_of(
             ("surface", triangles.flatten().copied().collect())
         }
         Target::Line([start, end]) => {
-            ("line", chosen(&|point| distance_to_line(point, *start, *end) <= near))
+            ("line", chosen(&|point| distance_to_line(point, [*start, *end]) <= near))
         }
         Target::Box([low, high]) => {
             let inside = |p: Point| (0..3).all(|d| low[d] - near <= p[d] && p[d] <= high[d] + near);
@@ -160,7 +160,8 @@ fn nodes_of(
 }
 
 /// Distance of a point from the line between two others.
-fn distance_to_line(point: Point, start: Point, end: Point) -> f64 {
+/// Distance of a point from a line between two [m].
+pub(super) fn distance_to_line(point: Point, [start, end]: [Point; 2]) -> f64 {
     let (along, from) = (sub(end, start), sub(point, start));
     let square = dot(along, along);
     let t = if square > 0.0 { (dot(from, along) / square).clamp(0.0, 1.0) } else { 0.0 };

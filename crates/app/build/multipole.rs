@@ -6,7 +6,7 @@ use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::coil::Frame;
 use fluxmorph_solver::functional::{MirrorPlane, Multipoles, OfTerms};
 use fluxmorph_solver::multipole::{Expansion, Harmonic};
-use fluxmorph_solver::{FieldModel, Functional};
+use fluxmorph_solver::{FieldModel, Functional, SolverError};
 
 use super::functional::follow;
 use super::locate_error::DiagnosticSink;
@@ -56,6 +56,12 @@ pub(crate) fn main_terms(set: &MultipoleSet) -> Vec<Harmonic> {
 /// Expansions that are not there, and terms that they do not have.
 pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     let mut faults = Vec::new();
+    for (k, set) in config.multipoles.iter().enumerate() {
+        if let Err(SolverError::Parameter { what, value, expected }) = frame(set) {
+            let message = format!("`multipoles[{k}].{what}` is {value}, which gives no directions");
+            faults.push(source.diagnostic(&format!("multipoles[{k}].{what}"), message).expected(expected));
+        }
+    }
     let known: Vec<&str> = config.multipoles.iter().map(|set| set.name.as_str()).collect();
     for (path, functional) in functionals(config).into_iter().filter(|(_, f)| f.kind.is_of_terms()) {
         let wanted = functional.region.as_deref().unwrap_or_default();
@@ -82,9 +88,13 @@ pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     faults
 }
 
+fn frame(set: &MultipoleSet) -> Result<Frame, SolverError> {
+    Frame::new(set.center, set.axis.vector(), set.direction)
+}
+
 /// The expansion that a table asks for, in space.
 fn expansion(set: &MultipoleSet) -> Result<Expansion, Error> {
-    let frame = Frame::new(set.center, set.axis.vector(), set.direction)?;
+    let frame = frame(set)?;
     Ok(match set.shape {
         ExpansionShape::Circle => Expansion::circle(&frame, set.radius, set.order),
         ExpansionShape::Ball => Expansion::ball(&frame, set.radius, set.order),

@@ -41,6 +41,12 @@ pub(super) const MOST_PERMEABILITY: f64 = 2e6;
 /// Conductivity that no metal has at room temperature [S/m]: silver has 6.3e7.
 const MOST_CONDUCTIVITY: f64 = 7e7;
 
+/// Densities [kg/m³] that are a solid's in g/cm³: ferrites have 4.8, tungsten 19.3.
+const OF_SOLIDS_IN_G_PER_CM3: RangeInclusive<f64> = 1.0..=22.6;
+
+/// Density that no material has [kg/m³]: osmium has 22 590.
+const MOST_DENSITY: f64 = 2.3e4;
+
 /// Remanence that no magnet has [T]: neodymium has 1.5.
 const MOST_REMANENCE: f64 = 2.0;
 
@@ -132,6 +138,26 @@ pub(super) fn warnings(
                 .to_owned(),
         );
     }
+    warnings.extend(material_warnings(config));
+    let free = if open_patches.is_empty() { HashSet::new() } else { faces_without_condition(config, mesh) };
+    warnings.extend(config.regions.iter().flat_map(|(name, own)| {
+        own.remanence.map(|own| magnet_warnings(config, (mesh, &free), (name, own))).unwrap_or_default()
+    }));
+    warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
+    warnings.extend(
+        windings(coils)
+            .filter_map(|(i, winding)| thin_windings::warning(config, mesh, &config.coils[i], winding)),
+    );
+    warnings.extend(super::forces::warnings(config, mesh, coils));
+    warnings.extend(phase_warnings(config));
+    warnings.extend(homogeneity_warnings(config, (mesh, &free)));
+    warnings.extend(unit_hint(config, mesh));
+    warnings
+}
+
+/// What to say of materials that do not exist.
+fn material_warnings(config: &Config) -> Vec<String> {
+    let mut warnings = Vec::new();
     for (name, own) in &config.materials {
         let permeability = own.relative_permeability;
         if permeability < LEAST_PERMEABILITY {
@@ -157,20 +183,18 @@ pub(super) fn warnings(
                  6.3e7"
             ));
         }
+        let Some(density) = own.density else { continue };
+        if OF_SOLIDS_IN_G_PER_CM3.contains(&density) {
+            warnings.push(format!(
+                "the material `{name}` has a density of {density} kg/m³, a thousandth of a solid's: \"{density} g/cm3\", where that is \
+                 meant"
+            ));
+        } else if density > MOST_DENSITY {
+            warnings.push(format!(
+                "the material `{name}` has a density of {density:e} kg/m³, more than any: osmium has 22 590"
+            ));
+        }
     }
-    let free = if open_patches.is_empty() { HashSet::new() } else { faces_without_condition(config, mesh) };
-    warnings.extend(config.regions.iter().flat_map(|(name, own)| {
-        own.remanence.map(|own| magnet_warnings(config, (mesh, &free), (name, own))).unwrap_or_default()
-    }));
-    warnings.extend(config.coils.iter().filter_map(|coil| image_warning(config, mesh.topology(), coil)));
-    warnings.extend(
-        windings(coils)
-            .filter_map(|(i, winding)| thin_windings::warning(config, mesh, &config.coils[i], winding)),
-    );
-    warnings.extend(super::forces::warnings(config, mesh, coils));
-    warnings.extend(phase_warnings(config));
-    warnings.extend(homogeneity_warnings(config, (mesh, &free)));
-    warnings.extend(unit_hint(config, mesh));
     warnings
 }
 

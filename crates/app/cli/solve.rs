@@ -10,7 +10,7 @@ use crate::build::{Mode, variable_count};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{FileHash, Manifest, RunDirectory, read_design, system_disk};
+use crate::files::{Manifest, RunDirectory, read_design, system_disk};
 use crate::run;
 
 /// What is analysed.
@@ -19,8 +19,8 @@ struct Subject {
     source: SourceMap,
     /// The file of the design; `None` for the initial one.
     design: Option<PathBuf>,
-    /// The folder of the run of the configuration, with the B–H tables that it has read; `None` without a run.
-    of_run: Option<(PathBuf, Vec<FileHash>)>,
+    /// The folder of the run of the configuration, and its manifest; `None` without a run.
+    of_run: Option<(PathBuf, Manifest)>,
 }
 
 /// The configuration to analyse, and the design file: of the result of a run, its configuration and its design.
@@ -43,7 +43,7 @@ fn subject(args: &SolveArgs) -> Result<Subject, Error> {
     config.output.directory = beside.into();
     let (config, source) = args.common.checked(config, source)?;
     let design = Some(args.design.clone().unwrap_or_else(|| path.clone()));
-    let of_run = Some((folder.to_owned(), manifest.tables));
+    let of_run = Some((folder.to_owned(), manifest));
     Ok(Subject { config, source, design, of_run })
 }
 

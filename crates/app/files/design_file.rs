@@ -10,7 +10,7 @@ use fluxmorph_optimizer::design::DesignSurface;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{FileHash, json_place};
+use super::{FileHash, Manifest, MeshHash, blake3_hex, json_place};
 use crate::config::{Diagnostic, DiagnosticReport, Document, LONGEST_LENGTH, Span, Subject};
 
 /// Largest design file that is read [bytes]: a million variables with their points.
@@ -75,15 +75,35 @@ pub struct DesignFile {
     points: Option<Vec<[f64; 3]>>,
     /// How often the run that the file is of refined its mesh.
     refinements: u64,
-    /// The folder of the run whose configuration is analysed, and the B–H tables that it has read; `None` without one.
-    run: Option<(PathBuf, Vec<FileHash>)>,
+    /// The folder of the run whose configuration is analysed, and its manifest; `None` without one.
+    run: Option<(PathBuf, Manifest)>,
 }
 
 impl DesignFile {
-    /// The same, for the configuration of the run in a folder, which has read these B–H tables; `None` for that of no run.
+    /// The same, for the configuration of the run in a folder with this manifest; `None` for that of no run.
     #[must_use]
-    pub fn of_run(self, run: Option<(PathBuf, Vec<FileHash>)>) -> Self {
+    pub fn of_run(self, run: Option<(PathBuf, Manifest)>) -> Self {
         Self { run, ..self }
+    }
+
+    /// What its run had otherwise than a configuration of this text and a mesh, in words.
+    pub fn changes_since_the_run(&self, text: &str, mesh: &MeshHash) -> Vec<String> {
+        let Some((folder, manifest)) = &self.run else { return Vec::new() };
+        let [config, own] =
+            [manifest.config.as_ref().map(|own| &own.blake3), manifest.mesh.as_ref().map(|own| &own.blake3)];
+        let is_other = [
+            ("config.toml", config.is_some_and(|hash| *hash != blake3_hex(text.as_bytes()))),
+            ("mesh", own.is_some_and(|hash| *hash != mesh.blake3)),
+        ];
+        let changed = is_other.into_iter().filter(|(_, is_other)| *is_other);
+        let run = folder.display();
+        changed
+            .map(|(what, _)| {
+                format!(
+                    "the {what} is another than when `{run}` was run: these are not the numbers of that run"
+                )
+            })
+            .collect()
     }
 
     /// How often its run refined the mesh, where the configuration of that run is analysed.
@@ -96,7 +116,7 @@ impl DesignFile {
     /// # Errors
     /// [`DesignFileError::Table`].
     pub fn check_tables(&self, read: &BTreeMap<PathBuf, String>) -> Result<(), DesignFileError> {
-        let Some((run, tables)) = &self.run else { return Ok(()) };
+        let Some((run, Manifest { tables, .. })) = &self.run else { return Ok(()) };
         let is_other =
             |own: &&FileHash| read.get(Path::new(&own.path)).is_some_and(|hash| *hash != own.blake3);
         match tables.iter().find(is_other) {
@@ -228,7 +248,8 @@ mod tests {
         let design = read_design(&path, 1).expect("a design");
         design.check_tables(&read("steel.csv", "b")).expect("one of no run");
         let tables = vec![FileHash { path: "steel.csv".to_owned(), blake3: "a".to_owned() }];
-        let design = design.of_run(Some(("run".into(), tables)));
+        let run = Manifest { tables, ..Manifest::new("run", 1) };
+        let design = design.of_run(Some(("run".into(), run)));
         design.check_tables(&read("steel.csv", "a")).expect("its own");
         design.check_tables(&read("other.csv", "b")).expect("another material");
         let error = design.check_tables(&read("steel.csv", "b")).expect_err("changed").to_string();

@@ -272,9 +272,8 @@ impl RunDirectory {
             return self.remove_unfinished(&self.path);
         }
         let surfaces = Manifest::read(self).map(|manifest| manifest.surfaces).unwrap_or_default();
-        // The list is a file's content: only names that this program gives are taken from it.
-        let surfaces = surfaces.iter().map(String::as_str).filter(|name| is_surface(name));
-        for name in FILES.iter().copied().chain(surfaces) {
+        self.remove_surfaces(&surfaces, &[])?;
+        for name in FILES {
             self.remove(&self.path.join(name))?;
         }
         for name in self.entries(&self.path)?.iter().filter(|name| is_case(name)) {
@@ -282,6 +281,15 @@ impl RunDirectory {
         }
         self.remove_unfinished(&self.path)?;
         self.remove_fields(&[])
+    }
+
+    /// Removes the STL files that a manifest names, but for some.
+    pub fn remove_surfaces(&self, named: &[String], kept: &[String]) -> Result<(), OutputError> {
+        // The list is a file's content: only names that this program gives are taken from it.
+        for name in named.iter().filter(|name| is_surface(name) && !kept.contains(name)) {
+            self.remove(&self.path.join(name))?;
+        }
+        Ok(())
     }
 
     /// Removes what a killed process left half-written, and the fields of all evaluations but some.

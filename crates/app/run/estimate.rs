@@ -88,6 +88,8 @@ pub(crate) struct Estimator<'a> {
     /// Of the problem, with all regions.
     full_mesh: &'a Mesh,
     effort: Effort,
+    /// Whether an estimate was made: that of another design is worth what it takes then, without which this one says little.
+    has_one: bool,
     /// Of first order: the models of second order.
     models: EnrichedModels,
     /// Of second order: the problem on halved edges, once it was asked for.
@@ -101,7 +103,8 @@ impl<'a> Estimator<'a> {
         (problem, full_mesh): (&'a Problem, &'a Mesh),
     ) -> Self {
         let effort = if is_asked_for(config) { Effort::Any } else { Effort::Affordable };
-        Self { config, source, problem, full_mesh, effort, models: EnrichedModels::new(effort), finer: None }
+        let models = EnrichedModels::new(effort);
+        Self { config, source, problem, full_mesh, effort, has_one: false, models, finer: None }
     }
 
     /// The estimated errors of an analysis; `None` where there is no estimate, for which the reason is reported.
@@ -133,10 +136,17 @@ impl<'a> Estimator<'a> {
             self.by_order(of, analysis)
         };
         match estimated {
-            Ok(estimate) => Some(estimate),
+            Ok(estimate) => {
+                self.has_one = true;
+                Some(estimate)
+            }
             Err(Error::Optimizer(OptimizerError::Solver(SolverError::NotConverged { .. })))
                 if self.effort == Effort::Affordable =>
             {
+                if self.has_one {
+                    (self.effort, self.models) = (Effort::Any, EnrichedModels::new(Effort::Any));
+                    return self.estimated(of, analysis, observer);
+                }
                 left_out(
                     "it was given up after as much work as six evaluations take; accuracy.estimate = true goes on",
                     observer,

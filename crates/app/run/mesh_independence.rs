@@ -87,11 +87,12 @@ pub struct FreshMesh {
 impl FreshMesh {
     /// That of a problem which is set up; `None` where no check is wanted, or no other mesh can be generated.
     pub fn of(config: &Config, problem: &Problem) -> Option<Self> {
-        let factor = config.output.verify_refinement;
-        if factor == 0.0 || problem.shape().is_none() || problem.objective().is_none() {
+        let output = &config.output;
+        if !output.is_verified_on_finer_cells() || problem.shape().is_none() || problem.objective().is_none()
+        {
             return None;
         }
-        let parts = factor.ceil() as usize;
+        let parts = output.verify_refinement.ceil() as usize;
         let mesh = DividedMesh::of(config, problem, parts)?;
         let growth = mesh.tet_count()? as f64 / config.mesh.tet_count()?.max(1) as f64;
         let memory = Sizes::of(problem).on_other_mesh(growth);
@@ -114,7 +115,7 @@ impl MeshIndependence<'_> {
         interrupted: &dyn Fn() -> bool,
         observer: &mut dyn Observer,
     ) -> Check {
-        if self.config.output.verify_refinement == 0.0 {
+        if !self.config.output.is_verified_on_finer_cells() {
             return Check::Finished;
         }
         if *self.shapes == ShapePair::Unchanged {

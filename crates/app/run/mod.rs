@@ -58,7 +58,7 @@ use crate::error::Error;
 use crate::exit_code::ExitCode;
 use crate::files::{
     CurvedFacets, Disk, FileHash, Manifest, MeshHash, ObjectiveResult, OverwritePolicy, RunDirectory,
-    RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command,
+    RunResult, RunStatus, check_finite, exports, peak_memory_bytes, resume_command, surface_files,
 };
 use crate::show::{RunObserver, Started};
 pub(crate) use resume::configuration;
@@ -278,6 +278,8 @@ impl Session<'_> {
         let directory = &self.directory;
         let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
         exports::write(self.config, directory, &optimum, mesh, observer)?;
+        // Of an end before, where the run was resumed and is not asked for them any more.
+        directory.remove_surfaces(&self.manifest.surfaces, &surface_files(&self.config.output.stl))?;
         if is_refined {
             // Of a mesh before, where the run had ended on it and was resumed.
             directory.remove(&directory.optimum())?;

@@ -29,7 +29,7 @@ pub fn solve(
     observer: &mut dyn RunObserver,
 ) -> Result<RunResult, Error> {
     let mut prepared = Prepared::new(config, source, Mode::Analysis, options, observer)?;
-    let problem = &mut prepared.setup.problem;
+    let problem = &prepared.setup.problem;
     if let (Some(shape), Some(design)) = (problem.shape(), &design) {
         design.check_places(shape.surface(), problem.original().bounding_box())?;
     }
@@ -42,6 +42,11 @@ pub fn solve(
             ));
         }
     }
+    let mesh = prepared.mesh_hash();
+    for change in design.iter().flat_map(|design| design.changes_since_the_run(source.text(), &mesh)) {
+        observer.warning(&change);
+    }
+    let problem = &prepared.setup.problem;
     let values = design_values(problem, design.map(|design| design.values), observer);
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
@@ -51,8 +56,6 @@ pub fn solve(
     let initial = problem.shape().filter(|_| problem.has_shared_bounds()).map(|shape| shape.initial());
     let initial = initial.filter(|&initial| initial != p);
     let mut initial = initial.map(|initial| problem.moved(initial)).transpose()?;
-    // Before it is cut.
-    let mesh = prepared.mesh_hash();
     let mut design = problem.shape().zip(values.as_deref()).map(|(s, p)| design_result(s, p));
     if halvings > 0 {
         if problem.share().is_some() {

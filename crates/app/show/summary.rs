@@ -38,15 +38,16 @@ impl Named {
             [term] => {
                 let region = term.functional.region.as_deref().map(|region| format!(" in {region}"));
                 let which = objective.worst().map(|worst| format!("{worst} ")).unwrap_or_default();
-                format!("{goal} {which}{}{}", term.functional.kind.name(), region.unwrap_or_default())
+                let (weight, kind) = (term.weight_in_words(), term.functional.kind.name());
+                format!("{goal} {which}{weight}{kind}{}", region.unwrap_or_default())
             }
             _ => format!("{goal} {} of {} terms", objective.worst().unwrap_or("a sum"), terms.len()),
         };
         let name = printable(&name).into_owned();
-        let unit = objective.si_unit().filter(|unit| *unit != "1");
+        let unit = objective.shown_unit();
         Self {
             name,
-            unit: unit.map_or_else(String::new, |unit| format!(" {unit}")),
+            unit: if unit.is_empty() { String::new() } else { format!(" {unit}") },
             is_of_shape: !objective.is_of_field(),
             constraints: Vec::new(),
         }

@@ -6,6 +6,8 @@
 //! much. Equal centres are ordered by index: the tree, and every answer, is the same for equal boxes. Does not live here:
 //! what the boxes hold (see [`crate::locate`] for elements).
 
+use std::borrow::Borrow;
+
 use crate::tet4::Point;
 
 /// Boxes in a leaf: about as long to look through as one more branch.
@@ -22,9 +24,11 @@ pub struct AxisBox {
 
 impl AxisBox {
     /// The smallest box around points; of no point, one that contains nothing.
-    pub fn around(points: &[Point]) -> Self {
+    pub fn around(points: impl IntoIterator<Item: Borrow<Point>>) -> Self {
         let none = Self { lower: [f64::INFINITY; 3], upper: [f64::NEG_INFINITY; 3] };
-        points.iter().fold(none, |all, &point| all.with(&Self { lower: point, upper: point }))
+        points
+            .into_iter()
+            .fold(none, |all, point| all.with(&Self { lower: *point.borrow(), upper: *point.borrow() }))
     }
 
     /// The box with each face moved outwards [m].

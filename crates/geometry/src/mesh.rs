@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
+use crate::box_tree::AxisBox;
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId};
 use crate::tet4::{self, Point};
@@ -93,14 +94,8 @@ impl Mesh {
 
     /// Smallest and largest coordinate in each direction [m].
     pub fn bounding_box(&self) -> [Point; 2] {
-        let mut limits = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-        for p in &self.points {
-            for d in 0..3 {
-                limits[0][d] = limits[0][d].min(p[d]);
-                limits[1][d] = limits[1][d].max(p[d]);
-            }
-        }
-        limits
+        let AxisBox { lower, upper } = AxisBox::around(&self.points);
+        [lower, upper]
     }
 
     /// The node of another mesh at the place of each node of this one, to the bit; `None` where it has none. Of as many nodes it is the

@@ -330,7 +330,7 @@ fn measure_along(
 }
 
 /// Least-squares slope of `log y` over `log x`.
-fn fitted_slope(x: &[f64], y: &[f64]) -> f64 {
+pub fn fitted_slope(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len() as f64;
     let (lx, ly): (Vec<f64>, Vec<f64>) =
         (x.iter().map(|x| x.ln()).collect(), y.iter().map(|y| y.ln()).collect());

@@ -3,6 +3,7 @@
 //! A part is held when no rigid motion `t + r × x` vanishes at all its known components. With `R` the rows of the six
 //! rigid motions at those components, that is: `Rᵀ R`, shape `(6, 6)`, is regular.
 
+use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::tet4::cross;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
@@ -33,19 +34,12 @@ pub(crate) fn check(mesh: &Mesh, elements: &[ElementId], unknowns: &Freedom) -> 
 }
 
 fn is_held(mesh: &Mesh, part: &[(usize, NodeId)], unknowns: &Freedom) -> bool {
-    let mut limits = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    for &(_, n) in part {
-        let p = mesh.point(n);
-        for d in 0..3 {
-            limits[0][d] = limits[0][d].min(p[d]);
-            limits[1][d] = limits[1][d].max(p[d]);
-        }
-    }
-    let size = (0..3).map(|d| limits[1][d] - limits[0][d]).fold(0.0, f64::max);
+    let around = AxisBox::around(part.iter().map(|&(_, n)| mesh.point(n)));
+    let size = around.extent();
     let mut gram = [[0.0; 6]; 6];
     for &(_, n) in part {
         let p = mesh.point(n);
-        let x: [f64; 3] = std::array::from_fn(|d| (2.0 * p[d] - limits[0][d] - limits[1][d]) / size);
+        let x: [f64; 3] = std::array::from_fn(|d| (2.0 * p[d] - around.lower[d] - around.upper[d]) / size);
         let axes = unknowns.axes(n);
         for c in (0..3).filter(|&c| unknowns.dofs().equation(n, c).is_none()) {
             // The component of t + r × x along the axis e: e · t + r · (x × e).

@@ -292,6 +292,14 @@ impl Limit {
         };
         functional.check(section);
         let bound = ValueBound::of(ratios, section, functional.dimension(), kind.range());
+        if let (Some([least, most]), ValueBound::AtMost(value) | ValueBound::AtLeast(value)) =
+            (kind.limits(), bound)
+            && (value < least || value > most)
+        {
+            let key = if matches!(bound, ValueBound::AtMost(_)) { "upper" } else { "lower" };
+            let message = format!("`{}.{key}` is {value}, and no {} is", section.path(), kind.name());
+            section.wrong(key, message, format!("from {least} to {most}"));
+        }
         Self::Functional { functional, bound }
     }
 

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 use super::design::{COMPONENTS, unit_vector};
 use super::load::LoadCase;
 use crate::config::section::Section;
+use crate::config::table::kinds::WORD;
 use crate::config::table::rules::{Rules, Then, is};
 use crate::config::table::table;
 use crate::config::text::dimension::Dimension;
@@ -244,6 +245,21 @@ impl ObjectiveKind {
         }
     }
 
+    /// Least and greatest value that any device has of it, where they are known.
+    pub(super) fn limits(self) -> Option<[f64; 2]> {
+        match self {
+            Self::Coupling | Self::PowerFactor => Some([-1.0, 1.0]),
+            Self::LinkEfficiency => Some([0.0, 1.0]),
+            _ => None,
+        }
+    }
+
+    /// Whether what several states have of it adds up to something: power and energy do, an inductance does not.
+    pub fn adds_up_over_states(self) -> bool {
+        let own = [Self::FluxDensitySquared, Self::TargetField, Self::Loss, Self::Energy, Self::Power];
+        own.contains(&self) || !self.is_of_field()
+    }
+
     /// Unit of its values.
     pub(super) fn dimension(self, weighting: Option<Weighting>) -> Dimension {
         match self {
@@ -332,6 +348,11 @@ impl ObjectiveKind {
 impl Functional {
     /// Checks which keys go with the kind, and completes what follows from it.
     pub(super) fn check(&mut self, section: &Section<'_>) {
+        if section.has("kind") && section.peek::<_, ObjectiveKind>("kind", &WORD).is_none() {
+            // Which keys it takes, and of what it is, cannot be told.
+            (self.region, self.coils) = (None, None);
+            return;
+        }
         let kind = self.kind;
         let is_homogeneity = kind == ObjectiveKind::Homogeneity;
         let is_component =

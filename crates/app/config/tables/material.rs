@@ -216,6 +216,13 @@ pub(super) fn check_regions(
                 "analysis.frequency = 0, or no remanence",
             );
         }
+        if region.remanence.is_some() && region.model == RegionModel::Perfect {
+            section.wrong(
+                "remanence",
+                format!("`{}` is a perfect conductor, and no flux leaves it as a magnet", section.path()),
+                "model = \"volume\", or no remanence",
+            );
+        }
         // A material that is missing or faulty is empty, and has been reported.
         if region.material.is_empty() {
             continue;
@@ -243,11 +250,14 @@ impl Config {
         self.regions.get(region).is_none_or(|own| own.model == RegionModel::Volume)
     }
 
-    /// The first region whose material has a B–H curve.
+    /// The first meshed region whose material has a B–H curve.
     pub fn saturating_region(&self) -> Option<&String> {
         let saturates =
-            |region: &&Region| self.materials.get(&region.material).is_some_and(Material::saturates);
-        self.regions.iter().find(|(_, region)| saturates(region)).map(|(name, _)| name)
+            |region: &Region| self.materials.get(&region.material).is_some_and(Material::saturates);
+        self.regions
+            .iter()
+            .find(|(name, region)| self.is_meshed(name) && saturates(region))
+            .map(|(name, _)| name)
     }
 }
 

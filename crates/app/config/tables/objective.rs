@@ -146,6 +146,13 @@ table! {
     }
 }
 
+impl Term {
+    /// What stands before its name where its value is weighted: `1000 times `.
+    pub fn weight_in_words(&self) -> String {
+        if self.weight == 1.0 { String::new() } else { format!("{} times ", self.weight) }
+    }
+}
+
 impl Objective {
     /// What is done to its value.
     pub fn goal_word(&self) -> &'static str {
@@ -174,6 +181,11 @@ impl Objective {
         let mut units = self.terms().iter().map(|term| term.functional.dimension().si_unit());
         let first = units.next()?;
         units.all(|unit| unit == first).then_some(first)
+    }
+
+    /// The unit behind its value; empty of a ratio, and where its terms have several.
+    pub fn shown_unit(&self) -> &'static str {
+        self.si_unit().filter(|unit| *unit != "1").unwrap_or_default()
     }
 
     /// The terms, at least one.

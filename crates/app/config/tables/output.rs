@@ -40,7 +40,7 @@ table! {
         #[serde(serialize_with = "as_text")]
         directory: PathBuf = TEXT, else PathBuf::from("runs");
         /// Which evaluations leave a VTU file. Default: `"every"`, and `"improved"` where `optimizer.max_evaluations` is above 20,
-        /// which the log says.
+        /// which the log says; `--max-evaluations` leaves it as it is, so that a run that goes on keeps what it has.
         fields: FieldsKept = WORD, else FieldsKept::Every;
         /// Whether the mesh of the optimum is written as a Gmsh file, `optimum.msh`: it is what a user goes on with. Regions whose
         /// surface alone is modelled are not in it.
@@ -49,7 +49,8 @@ table! {
         stl: Vec<String> = NAMES, else Vec::new();
         /// `run`: after the optimisation the mesh is generated anew with every cell that moves or is observed divided in so many
         /// parts along each axis (a fraction is rounded up), and the initial and the best shape are analysed on it, their
-        /// constraints too. What an optimiser gained from the errors of one mesh is lost on another. 0: no check. With the
+        /// constraints too. What an optimiser gained from the errors of one mesh is lost on another. 0: no check. 1: what the
+        /// estimates and other elements say, without a finer mesh. With the
         /// default the check costs two analyses without gradients on three to five times the elements. A mesh from a file or of the
         /// generator `block` is cut instead, at both shapes, into at least so many times the elements; so is one whose fresh mesh
         /// cannot be moved as far or costs too much, which the run says.
@@ -74,6 +75,11 @@ choice! {
 }
 
 impl Output {
+    /// Whether the best shape of a run is looked at on finer cells than those of the run.
+    pub fn is_verified_on_finer_cells(&self) -> bool {
+        self.verify_refinement > 1.0
+    }
+
     /// Completes what follows from the folder and the name of the configuration, from its design surfaces and from the length
     /// of its run.
     pub(super) fn complete(

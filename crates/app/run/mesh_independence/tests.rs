@@ -45,6 +45,18 @@ fn verified(
     stop_reason: StopReason,
     interrupted: bool,
 ) -> (ObjectiveResult, Recorded) {
+    let parts = config.output.verify_refinement as usize;
+    verified_in(parts, (config, source), shapes, stop_reason, interrupted)
+}
+
+/// With every cell in so many parts.
+fn verified_in(
+    parts: usize,
+    (config, source): (&Config, &SourceMap),
+    shapes: &ShapePair,
+    stop_reason: StopReason,
+    interrupted: bool,
+) -> (ObjectiveResult, Recorded) {
     let mut objective = ObjectiveResult {
         initial: 1.0,
         best: 0.5,
@@ -57,7 +69,10 @@ fn verified(
     };
     let mut recorded = Recorded::default();
     let problem = set_up(config, source, Mode::Optimisation).expect("a sound problem").problem;
-    let fresh = FreshMesh::of(config, &problem).map(|fresh| FreshMesh { memory: [0; 2], ..fresh });
+    let fresh = FreshMesh::of(config, &problem).map(|fresh| {
+        let mesh = DividedMesh::of(config, &problem, parts).expect("a generated mesh");
+        FreshMesh { mesh, parts, memory: [0; 2], ..fresh }
+    });
     let (fresh, meshes, sizes) = (fresh.as_ref(), None, Sizes::of(&problem));
     let check = MeshIndependence { config, source, stop_reason, shapes, fresh, meshes, sizes };
     check.verify(&mut objective, &|| interrupted, &mut recorded);
@@ -67,8 +82,7 @@ fn verified(
 #[test]
 fn the_same_cells_give_the_same_ratio_whatever_carries_the_shape() {
     for on_nodes in [false, true] {
-        let (mut config, source) = quick(on_nodes);
-        config.output.verify_refinement = 1.0;
+        let (config, source) = quick(on_nodes);
         let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
         let best = dished(&setup);
         let value = |p: &[f64]| {
@@ -83,7 +97,7 @@ fn the_same_cells_give_the_same_ratio_whatever_carries_the_shape() {
         let shapes = ShapePair::of(&config, &setup, &best).expect("a design surface");
         assert_eq!(matches!(shapes, ShapePair::Displacements { .. }), on_nodes);
         let (objective, recorded) =
-            verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+            verified_in(1, (&config, &source), &shapes, StopReason::ObjectiveConverged, false);
         let found = objective.verification.unwrap_or_else(|| panic!("{:?}", recorded.warnings));
         assert_eq!(objective.verified_ratio, Some(found.ratio));
         // The residual that every linear solution has to reach, twice.

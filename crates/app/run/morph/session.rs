@@ -15,7 +15,7 @@ use serde::Serialize;
 use super::tune::{Found, nothing_to_search, tune};
 use super::{CaseReport, MorphReport, MovedMesh, Parameters, csv, move_mesh};
 use crate::build::{MotionSetup, set_up_motion};
-use crate::config::{Config, Morph, Paper, SourceMap, resolved_toml};
+use crate::config::{Config, Morph, MotionLaw, Paper, SourceMap, resolved_toml};
 use crate::error::Error;
 use crate::files::{Manifest, RunDirectory, RunStatus, StopReason, peak_memory_bytes, to_json};
 use crate::run::{Options, mesh_hash};
@@ -141,6 +141,13 @@ fn jobs<'a>(
                 "there is no [[morph.motion]] outside of the cases: what to tune for is not clear",
             )
             .help("move the motion of one case to [[morph.motion]]");
+        return Err(source.error(vec![fault]).into());
+    }
+    let law = config.remesh.as_ref().and_then(|remesh| remesh.law);
+    if parameters == Parameters::Tuned && law.is_some_and(|law| law != MotionLaw::Linear) {
+        let message = "`remesh.law` is another than the tuner searches the parameters of";
+        let fault =
+            source.diagnostic("remesh.law", message).expected("\"linear\", or `morph` without --tune");
         return Err(source.error(vec![fault]).into());
     }
     if own.cases.is_empty() || parameters == Parameters::Tuned {

@@ -8,6 +8,7 @@
 
 use std::ops::ControlFlow;
 
+use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::quality::QualityReport;
 use fluxmorph_geometry::tet4::{Point, add, norm, volume};
 use fluxmorph_optimizer::nlopt::{Search, maximise};
@@ -249,20 +250,14 @@ fn force_unit(setup: &MotionSetup, design: &[Point]) -> Point {
     let mesh = &setup.mesh;
     let mean = design.iter().fold([0.0; 3], |sum, u| add(sum, *u));
     let direction = if norm(mean) > 0.0 { mean.map(|c| c / norm(mean)) } else { [0.0, 0.0, 1.0] };
-    let (mut whole, mut nodes, mut limits) = (0.0, Vec::new(), [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]]);
+    let (mut whole, mut nodes) = (0.0, Vec::new());
     for &element in setup.remesh.subregions.iter().flat_map(|subregion| &subregion.elements) {
         whole += volume(mesh.vertices(element));
         nodes.extend(mesh.topology().tet(element));
-        for p in mesh.vertices(element) {
-            for d in 0..3 {
-                limits[0][d] = limits[0][d].min(p[d]);
-                limits[1][d] = limits[1][d].max(p[d]);
-            }
-        }
     }
     nodes.sort_unstable();
     nodes.dedup();
-    let extent = (0..3).map(|d| limits[1][d] - limits[0][d]).fold(0.0, f64::max);
+    let extent = AxisBox::around(nodes.iter().map(|&n| mesh.point(n))).extent();
     let young = setup.remesh.subregions[0].young;
     let size = young * setup.path.largest() * whole / (nodes.len() as f64 * extent * extent);
     direction.map(|c| size * c)
@@ -299,8 +294,6 @@ fn tuned_config(config: &Config, setup: &RemeshSetup) -> Config {
     if let Some(morph) = &mut config.morph {
         morph.cases.clear();
     }
-    let mut name = config.output.directory.file_name().unwrap_or_default().to_owned();
-    name.push("_tuned");
-    config.output.directory.set_file_name(name);
+    config.output.directory.push("tuned");
     config
 }

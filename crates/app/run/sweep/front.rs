@@ -74,10 +74,10 @@ impl Criterion {
     fn of_objective(objective: &Objective) -> Self {
         Self {
             name: match objective.terms() {
-                [term] => name_of(term),
+                [term] => term.weight_in_words() + &name_of(term),
                 _ => "objective".to_owned(),
             },
-            unit: objective.si_unit().filter(|unit| *unit != "1").unwrap_or_default(),
+            unit: objective.shown_unit(),
             smaller_is_better: objective.goal.sign() > 0.0,
             of: Measured::Objective(Box::new(objective.clone())),
         }

@@ -9,6 +9,7 @@ use super::cut::{CutPlane, NodeMeans, Patch};
 use super::data::{RunData, Snapshot};
 use super::picture::{Picture, pair};
 use super::plane::{Plane, bounds, extremes};
+use super::tables::of_first_state;
 use super::ticks::{Count, number};
 use super::window::Window;
 use crate::build::Outline;
@@ -58,7 +59,8 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Option<Result<Markup,
     let all: Vec<Deviation<'_>> = fields.filter_map(|field| Deviation::of(outline, field)).collect();
     let last = all.last()?;
     let window = window(outline, last);
-    Some(drawn(outline, window, &all))
+    let state = data.result.as_ref().map(of_first_state).unwrap_or_default();
+    Some(drawn(outline, window, (&all, &state)))
 }
 
 /// Across the shortest extent of the elements, through their middle.
@@ -80,7 +82,11 @@ fn window(outline: &Outline, deviation: &Deviation<'_>) -> Window {
     }
 }
 
-fn drawn<'a>(outline: &Outline, window: Window, all: &[Deviation<'a>]) -> Result<Markup, String> {
+fn drawn<'a>(
+    outline: &Outline,
+    window: Window,
+    (all, state): (&[Deviation<'a>], &str),
+) -> Result<Markup, String> {
     let [low, high] = extremes(all.iter().flat_map(|own| own.elements.iter().map(|e| own.values[e.index()])));
     let most = low.abs().max(high.abs());
     if !(most.is_finite() && most > 0.0) {
@@ -111,7 +117,7 @@ fn drawn<'a>(outline: &Outline, window: Window, all: &[Deviation<'a>]) -> Result
         figure id="deviation" {
             (pair("Deviation", &pictures))
             figcaption {
-                "Deviation of the field from what is asked for, in " (picture.window.describe("mm"))
+                "Deviation of the field from what is asked for" (state) ", in " (picture.window.describe("mm"))
                 ", the same scale for all. " (words) " Elements count by their volume."
             }
         }

@@ -6,7 +6,7 @@ use fluxmorph_geometry::Mesh;
 use maud::{Markup, html};
 
 use super::data::RunData;
-use super::ticks::{duration, group_digits, number, threads, trim_zeros};
+use super::ticks::{decimals_of, duration, group_digits, number, threads, trim_zeros};
 use crate::config::Elements;
 use crate::files::{Manifest, shell_word};
 
@@ -63,7 +63,9 @@ pub(super) fn mesh(data: &RunData) -> Markup {
 }
 
 fn bounding_box(mesh: &Mesh) -> String {
-    let [low, high] = mesh.bounding_box().map(|p| p.map(|c| trim_zeros(1e3 * c, 1)).join(", "));
+    let corners = mesh.bounding_box().map(|p| p.map(|c| 1e3 * c));
+    let decimals = decimals_of(&corners.concat(), 1);
+    let [low, high] = corners.map(|p| p.map(|c| trim_zeros(c, decimals)).join(", "));
     format!("({low}) to ({high}) mm")
 }
 

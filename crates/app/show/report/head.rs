@@ -75,7 +75,7 @@ fn status(data: &RunData) -> (&'static str, String) {
 
 /// The unit of the objective, where all its terms have the same.
 fn unit(data: &RunData) -> &'static str {
-    data.config.objective.as_ref().and_then(Objective::si_unit).unwrap_or_default()
+    data.config.objective.as_ref().map(Objective::shown_unit).unwrap_or_default()
 }
 
 /// What an optimisation has gained, and at which cost.
@@ -153,8 +153,9 @@ fn finer_mesh_card(data: &RunData, objective: &ObjectiveResult) -> Card {
             (ticks::ratio(ratio), remark)
         }
         (Some(ratio), None) => (ticks::ratio(ratio), "the initial shape is the best".to_owned()),
-        (None, ..) if data.config.output.verify_refinement == 0.0 => {
-            ("not checked".to_owned(), "output.verify_refinement is 0".to_owned())
+        (None, ..) if !data.config.output.is_verified_on_finer_cells() => {
+            let parts = data.config.output.verify_refinement;
+            ("not checked".to_owned(), format!("output.verify_refinement is {parts}"))
         }
         _ => ("not checked".to_owned(), "see the messages at the end of the run".to_owned()),
     };
@@ -173,7 +174,10 @@ fn mean_card(data: &RunData, outline: &Outline) -> Option<Card> {
     };
     let [before, after] = data.fields.each_ref().map(mean);
     let state = data.result.as_ref().map(of_first_state).unwrap_or_default();
-    let regions = observed::region_names(data).join(", ") + &state;
+    // A body of [[forces]] and an expansion are no regions.
+    let is_region = |name: &&str| outline.mesh.topology().region(name).is_ok();
+    let names: Vec<&str> = observed::region_names(data).into_iter().filter(is_region).collect();
+    let regions = names.join(", ") + &state;
     let remark = before.map_or(regions.clone(), |before| format!("{before} before, in {regions}"));
     Some(("mean |B|", after?, remark))
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use fluxmorph_geometry::NodeId;
+use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{self, Point, area_vector, norm};
 use maud::{Markup, html};
 
@@ -424,6 +425,9 @@ fn shares_changed(
 ) -> [f64; 2] {
     let nodes = design.surface.nodes();
     let (mut total, mut shares) = (0.0, [0.0; 2]);
+    let size = 1e3 * AxisBox::around(nodes.iter().map(|&n| outline.full_mesh.point(n))).extent();
+    // A micrometre is nobody's design, but on a device of some millimetres.
+    let least = 3e-3_f64.min(3e-5 * size);
     for triangle in &design.triangles {
         let area = norm(area_vector(triangle.map(|n| outline.full_mesh.point(n))));
         let change: f64 = triangle
@@ -432,10 +436,9 @@ fn shares_changed(
             .filter_map(|i| Some(after[i]? - before[i]?))
             .sum();
         total += area;
-        // A micrometre is nobody's design.
-        if change < -3e-3 {
+        if change < -least {
             shares[0] += area;
-        } else if change > 3e-3 {
+        } else if change > least {
             shares[1] += area;
         }
     }

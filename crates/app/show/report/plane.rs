@@ -1,5 +1,6 @@
 //! A plane to draw on: points in space become places in millimetres.
 
+use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
 use fluxmorph_optimizer::design::Mirror;
 
@@ -93,9 +94,8 @@ pub(super) fn with_room([low, high]: [f64; 2]) -> [f64; 2] {
 
 /// Lower and upper corner around points.
 pub(super) fn bounds(points: impl IntoIterator<Item = Point>) -> [Point; 2] {
-    points.into_iter().fold([[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]], |[low, high], p| {
-        [std::array::from_fn(|d| low[d].min(p[d])), std::array::from_fn(|d| high[d].max(p[d]))]
-    })
+    let AxisBox { lower, upper } = AxisBox::around(points);
+    [lower, upper]
 }
 
 fn middle(points: &[Point]) -> Point {

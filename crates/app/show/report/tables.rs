@@ -5,10 +5,10 @@ use maud::{Markup, html};
 use super::circuits::circuits;
 use super::data::RunData;
 use super::markup::{note, table};
-use super::ticks::{decimals_of, number, trim_zeros};
+use super::ticks::{decimals_of, given, number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline, PermeabilityOf, skin_warnings};
-use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel, Term};
+use crate::config::{Constraint, Dimension, Limit, Objective, ObjectiveKind, RegionModel, Term};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateResult, TermResult};
 use crate::show::Evaluation;
 use crate::show::states::State;
@@ -182,6 +182,7 @@ fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64
     match constraints.iter().find(|own| own.is_called(name)).map(|own| &own.limit) {
         Some(Limit::Functional { functional, .. }) => match functional.kind {
             ObjectiveKind::Volume => ("cm³", 1e6),
+            _ if functional.dimension() == Dimension::Ratio => ("", 1.0),
             _ => (functional.dimension().si_unit(), 1.0),
         },
         Some(Limit::Thickness { .. }) => ("mm", 1e3),
@@ -215,8 +216,8 @@ fn terms(terms: &[TermResult], objective: Option<&Objective>) -> Markup {
                 (None, None) if own.is_some_and(|own| !own.kind.is_of_field()) => "–".to_owned(),
                 (None, frequency) => frequency.map_or("all".to_owned(), hertz),
             },
-            trim_zeros(t.weight, 6),
-            format!("{} {}", number(t.value, 6), own.map_or("in SI", |own| own.dimension().si_unit())),
+            given(t.weight),
+            number(t.value, 6) + &own.map_or(" in SI".to_owned(), |own| own.dimension().behind_value()),
             number(t.weight * t.value, 6),
         ]
     };
@@ -285,8 +286,10 @@ fn rows_of(state: &State<'_>, probe: &ProbeResult, initial: Option<&ProbeResult>
         let sign = if im < 0.0 { "−" } else { "+" };
         if state.frequency == 0.0 { real } else { format!("{real} {sign} {} j", number(1e3 * im.abs(), 3)) }
     };
+    let places: Vec<_> = probe.points_m.iter().map(|point| point.map(|c| 1e3 * c)).collect();
+    let decimals = decimals_of(places.as_flattened(), 2);
     let row = |k: usize| {
-        let place = probe.points_m[k].map(|c| trim_zeros(1e3 * c, 2)).join(", ");
+        let place = places[k].map(|c| trim_zeros(c, decimals)).join(", ");
         let mut cells = vec![probe.name.clone(), place, words_of(state.load, state.frequency)];
         let millitesla = |size: Option<f64>| size.map_or(String::new(), |size| number(1e3 * size, 4));
         cells.push(millitesla(initial.and_then(|initial| magnitude(initial, k))));

@@ -146,11 +146,11 @@ pub(super) fn constraint(constraint: &Constraint) -> String {
     let within = |bound: &ValueBound, unit: &str| match bound {
         ValueBound::AtMost(value) => format!("at most {}{unit}", number(*value, 4)),
         ValueBound::AtMostRatio(ratio) => {
-            format!("at most {} times its initial value", trim_zeros(*ratio, 6))
+            format!("at most {} times its initial value", given(*ratio))
         }
         ValueBound::AtLeast(value) => format!("at least {}{unit}", number(*value, 4)),
         ValueBound::AtLeastRatio(ratio) => {
-            format!("at least {} times its initial value", trim_zeros(*ratio, 6))
+            format!("at least {} times its initial value", given(*ratio))
         }
     };
     match &constraint.limit {

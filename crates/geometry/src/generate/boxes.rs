@@ -216,6 +216,7 @@ fn observation_cells<'a>(
 ) -> Result<BTreeMap<&'a str, Vec<Vec<ElementId>>>, MeshError> {
     let mut cells_of: BTreeMap<&str, Vec<Vec<ElementId>>> = BTreeMap::new();
     let divided = |name: &str| p.regions.iter().any(|region| region.name == name && region.cells.is_some());
+    let mut is_in_one = vec![false; topology.tets().len()];
     for region in p.regions.iter().filter(|region| divided(&region.name)) {
         let counts = region.cells.unwrap_or([1; 3]);
         let lines: [Vec<usize>; 3] = [0, 1, 2].map(|d| {
@@ -228,13 +229,19 @@ fn observation_cells<'a>(
                 for k in lines[2].windows(2) {
                     let mut cell = grid.elements_within([[i[0], i[1]], [j[0], j[1]], [k[0], k[1]]]);
                     cell.retain(|e| topology.region_of()[e.index()] == id_of[region.name.as_str()]);
+                    let refuse = |expected: &str| {
+                        let value = format!("`{}` with cells = {counts:?}", region.name);
+                        MeshError::Parameter { parameter: "boxes.regions", value, expected: expected.into() }
+                    };
                     if cell.is_empty() {
-                        return Err(MeshError::Parameter {
-                            parameter: "boxes.regions",
-                            value: format!("`{}` with cells = {counts:?}", region.name),
-                            expected: "a later box covers one of its observation cells; move one of them"
-                                .into(),
-                        });
+                        return Err(refuse(
+                            "a later box covers one of its observation cells; move one of them",
+                        ));
+                    }
+                    if cell.iter().any(|e| std::mem::replace(&mut is_in_one[e.index()], true)) {
+                        let expected =
+                            "boxes of one name do not overlap where one of them has observation cells";
+                        return Err(refuse(expected));
                     }
                     all.push(cell);
                 }
@@ -367,8 +374,14 @@ mod tests {
                 }
             }
         }
-        parameters.regions.push(region("air", [[0.0, 0.0, 4.0], [1.0, 1.0, 5.0]]));
-        assert!(boxes(&parameters).expect_err("a cell is covered").to_string().contains("observation"));
+        let refused = |over: BoxRegion| {
+            let regions = [parameters.regions.clone(), vec![over]].concat();
+            boxes(&BoxesParameters { regions, ..parameters.clone() }).expect_err("over a cell").to_string()
+        };
+        let of_air = refused(region("air", [[0.0, 0.0, 4.0], [1.0, 1.0, 5.0]]));
+        assert!(of_air.contains("covers one of its observation cells"), "{of_air}");
+        let twice = refused(region("observation", [[1.0, 0.0, 4.0], [3.0, 3.0, 5.0]]));
+        assert!(twice.contains("do not overlap"), "{twice}");
     }
 
     #[test]

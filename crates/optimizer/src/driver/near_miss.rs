@@ -11,7 +11,6 @@ use super::stop::Stop;
 use super::{Record, StopReason};
 use crate::error::Error;
 use crate::nlopt::{CONSTRAINT_TOLERANCE, Sample};
-use crate::objective::Goal;
 
 /// Relative excess over a bound up to which a design is one of these: from farther away a step back to first order loses too much
 /// of what was found.
@@ -34,74 +33,95 @@ const SWEEPS: usize = 50;
 pub(super) struct NearMiss {
     pub(super) evaluation: usize,
     pub(super) objective: f64,
-    design: Vec<f64>,
-    /// Values of the constraints, with their gradients.
-    constraints: Vec<(f64, Vec<f64>)>,
+    /// A design near it that keeps all constraints and the bounds of the variables, to first order; `None` where none is found.
+    stepped_back: Option<Vec<f64>>,
+    /// What the method sees as the value of that design, to first order; without one that of the design itself.
+    promised: f64,
     /// The worst of them, and its excess relative to its bound.
     pub(super) worst: (usize, f64),
     has_been_tried: bool,
 }
 
 impl NearMiss {
-    /// A design, where it is one.
-    pub(super) fn of(record: &Record, sample: &Sample) -> Option<Self> {
+    /// A design, where it is one; the variables have bounds.
+    pub(super) fn of(record: &Record, sample: &Sample, bounds: [&[f64]; 2]) -> Option<Self> {
         let excesses = sample.constraints.iter().map(|(excess, _)| *excess).enumerate();
         let worst = excesses.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let is_near = worst.1 > CONSTRAINT_TOLERANCE && worst.1 <= NEAR;
-        is_near.then(|| Self {
-            evaluation: record.row.evaluation,
-            objective: record.row.objective,
-            design: record.design.clone(),
-            constraints: sample.constraints.clone(),
-            worst,
-            has_been_tried: false,
+        is_near.then(|| {
+            let stepped_back = stepped_back(&record.design, &sample.constraints, worst.1, bounds);
+            let promised = stepped_back.as_deref().map(|p| linearised(sample, &record.design, p));
+            Self {
+                evaluation: record.row.evaluation,
+                objective: record.row.objective,
+                promised: promised.unwrap_or(sample.value),
+                stepped_back,
+                worst,
+                has_been_tried: false,
+            }
         })
     }
 
-    /// What it gains on a best design with this violation and objective: where that keeps the bounds, only what is far more than the
-    /// excess.
-    pub(super) fn gain(&self, goal: Goal, (violation, best): (f64, f64)) -> Option<f64> {
-        let gain = goal.sign() * (best - self.objective) / best.abs();
-        (violation > 0.0 || gain > WORTH.max(100.0 * self.worst.1)).then_some(gain)
+    /// What it gains on a best design with this violation and value: where that keeps the bounds, only what is worth an evaluation,
+    /// and without a step back what is far more than the excess.
+    pub(super) fn gain(&self, (violation, best): (f64, f64)) -> Option<f64> {
+        let gain = (best - self.promised) / best.abs();
+        let least = if self.stepped_back.is_some() { WORTH } else { WORTH.max(100.0 * self.worst.1) };
+        (violation > 0.0 || gain > least).then_some(gain)
     }
+}
 
-    /// A design near it that keeps all constraints, to first order, and the bounds of the variables; `None` where none is found.
-    fn stepped_back(&self, lower: &[f64], upper: &[f64]) -> Option<Vec<f64>> {
-        let margin = CONSTRAINT_TOLERANCE.max((MARGIN + CURVATURE * self.worst.1) * self.worst.1);
-        let mut p = self.design.clone();
-        for _ in 0..SWEEPS {
-            let mut is_within = true;
-            for (value, gradient) in &self.constraints {
-                let moved = p.iter().zip(&self.design).map(|(p, from)| p - from);
-                let excess = value + gradient.iter().zip(moved).map(|(g, d)| g * d).sum::<f64>();
-                if excess <= CONSTRAINT_TOLERANCE - margin {
-                    continue;
-                }
-                is_within = false;
-                // Variables at a bound that the step points out of do not move.
-                let is_free = |k: usize| if gradient[k] > 0.0 { p[k] > lower[k] } else { p[k] < upper[k] };
-                let free: Vec<usize> = (0..p.len()).filter(|&k| is_free(k)).collect();
-                let square: f64 = free.iter().map(|&k| gradient[k].powi(2)).sum();
-                if square == 0.0 {
-                    return None;
-                }
-                let step = (excess + margin) / square;
-                free.iter().for_each(|&k| p[k] = (p[k] - step * gradient[k]).clamp(lower[k], upper[k]));
+/// The value of a sample at another design, to first order.
+fn linearised(sample: &Sample, from: &[f64], to: &[f64]) -> f64 {
+    let at = |(value, gradient): (f64, &[f64])| {
+        let moved = to.iter().zip(from).map(|(to, from)| to - from);
+        value + gradient.iter().zip(moved).map(|(g, d)| g * d).sum::<f64>()
+    };
+    let members = sample.members.iter().map(|(value, gradient)| at((*value, gradient)));
+    members.reduce(f64::max).unwrap_or_else(|| at((sample.value, &sample.gradient)))
+}
+
+/// A design near one that is beyond a bound by a relative excess, within its bounds.
+fn stepped_back(
+    design: &[f64],
+    constraints: &[(f64, Vec<f64>)],
+    worst: f64,
+    [lower, upper]: [&[f64]; 2],
+) -> Option<Vec<f64>> {
+    let margin = CONSTRAINT_TOLERANCE.max((MARGIN + CURVATURE * worst) * worst);
+    let mut p = design.to_vec();
+    for _ in 0..SWEEPS {
+        let mut is_within = true;
+        for (value, gradient) in constraints {
+            let moved = p.iter().zip(design).map(|(p, from)| p - from);
+            let excess = value + gradient.iter().zip(moved).map(|(g, d)| g * d).sum::<f64>();
+            if excess <= CONSTRAINT_TOLERANCE - margin {
+                continue;
             }
-            if is_within {
-                return Some(p);
+            is_within = false;
+            // Variables at a bound that the step points out of do not move.
+            let is_free = |k: usize| if gradient[k] > 0.0 { p[k] > lower[k] } else { p[k] < upper[k] };
+            let free: Vec<usize> = (0..p.len()).filter(|&k| is_free(k)).collect();
+            let square: f64 = free.iter().map(|&k| gradient[k].powi(2)).sum();
+            if square == 0.0 {
+                return None;
             }
+            let step = (excess + margin) / square;
+            free.iter().for_each(|&k| p[k] = (p[k] - step * gradient[k]).clamp(lower[k], upper[k]));
         }
-        None
+        if is_within {
+            return Some(p);
+        }
     }
+    None
 }
 
 impl Run<'_> {
     /// Of the designs beyond their bounds by little that are `wanted`, the one that gains most on the best one.
     fn greatest_miss(&self, wanted: impl Fn(&NearMiss) -> bool) -> Option<usize> {
-        let best = self.incumbent_values()?;
+        let best = self.incumbent_sample()?;
         let misses = self.near_misses.iter().enumerate().filter(|(_, miss)| wanted(miss));
-        let gains = misses.filter_map(|(k, miss)| Some((k, miss.gain(self.goal, best)?)));
+        let gains = misses.filter_map(|(k, miss)| Some((k, miss.gain(best)?)));
         gains.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
     }
 
@@ -118,8 +138,7 @@ impl Run<'_> {
     /// The next step back that the mesh carries, with the number of its miss. What it does not carry is not tried again.
     pub(super) fn next_step_back(&mut self) -> Result<Option<(usize, Carriage)>, Stop> {
         while let Some(k) = self.untried() {
-            let (lower, upper) = (self.shape().lower(), self.shape().upper());
-            if let Some(design) = self.near_misses[k].stepped_back(lower, upper) {
+            if let Some(design) = self.near_misses[k].stepped_back.clone() {
                 match self.carry(&design) {
                     Ok(carried) if !carried.is_cut() => return Ok(Some((k, carried))),
                     Ok(_) | Err(Stop::Mesh(_)) => {}
@@ -197,42 +216,53 @@ impl Run<'_> {
 mod tests {
     use super::*;
 
-    fn missed(design: &[f64], constraints: &[(f64, Vec<f64>)]) -> NearMiss {
+    fn missed(design: &[f64], constraints: &[(f64, Vec<f64>)], bounds: [&[f64]; 2]) -> NearMiss {
         let record = Record { design: design.to_vec(), ..Record::default() };
         let sample = Sample { constraints: constraints.to_vec(), ..Sample::default() };
-        NearMiss::of(&record, &sample).expect("one")
+        NearMiss::of(&record, &sample, bounds).expect("one")
     }
 
     #[test]
     fn a_step_back_keeps_every_bound_to_first_order_and_moves_no_further() {
         // x + 2y <= 1 by 1e-4 too much, and 3x <= 1 with no room.
-        let miss = missed(&[0.333, 0.3335], &[(1e-4, vec![1.0, 2.0]), (0.0, vec![3.0, 0.0])]);
+        let beyond = |lower: &[f64]| {
+            missed(&[0.333, 0.3335], &[(1e-4, vec![1.0, 2.0]), (0.0, vec![3.0, 0.0])], [lower, &[1.0; 2]])
+        };
+        let miss = beyond(&[0.0; 2]);
         assert_eq!(miss.worst, (0, 1e-4));
-        let p = miss.stepped_back(&[0.0; 2], &[1.0; 2]).expect("there is room");
+        let p = miss.stepped_back.expect("there is room");
         let [dx, dy] = [p[0] - 0.333, p[1] - 0.3335];
         assert!(1e-4 + dx + 2.0 * dy <= 0.0 && 3.0 * dx <= 1e-6, "{dx} {dy}");
         assert!(dx.hypot(dy) < 1.1e-4 / 5.0_f64.sqrt(), "{dx} {dy}");
         // Where one variable is at its bound, the other goes all the way.
-        let p = miss.stepped_back(&[0.0, 0.3335], &[1.0; 2]).expect("there is room");
+        let p = beyond(&[0.0, 0.3335]).stepped_back.expect("there is room");
         assert!(p[1] == 0.3335 && (0.333 - p[0] - 1e-4).abs() < 2e-6, "{p:?}");
         // Where none can go, or bounds oppose each other, there is none.
-        assert_eq!(miss.stepped_back(&[0.333, 0.3335], &[1.0; 2]), None);
-        let opposed = missed(&[0.5], &[(1e-4, vec![1.0]), (1e-4, vec![-1.0])]);
-        assert_eq!(opposed.stepped_back(&[0.0], &[1.0]), None);
+        assert_eq!(beyond(&[0.333, 0.3335]).stepped_back, None);
+        let opposed = missed(&[0.5], &[(1e-4, vec![1.0]), (1e-4, vec![-1.0])], [&[0.0], &[1.0]]);
+        assert_eq!(opposed.stepped_back, None);
     }
 
     #[test]
-    fn only_what_is_beyond_by_little_and_gains_much_counts() {
-        let of = |excess: f64| {
-            let sample = Sample { constraints: vec![(excess, vec![1.0])], ..Sample::default() };
-            NearMiss::of(&Record { design: vec![0.0], ..Record::default() }, &sample)
+    fn what_is_beyond_by_little_counts_by_what_its_step_back_promises() {
+        let of = |excess: f64, gradient: f64, lower: f64| {
+            let constraints = vec![(excess, vec![1.0])];
+            let sample = Sample { value: 0.9, gradient: vec![gradient], constraints, ..Sample::default() };
+            NearMiss::of(&Record { design: vec![0.0], ..Record::default() }, &sample, [&[lower], &[1.0]])
         };
-        assert!(of(1e-7).is_none() && of(2e-2).is_none());
-        let miss = NearMiss { objective: 0.9, ..of(1e-4).expect("near") };
-        assert_eq!(miss.gain(Goal::Maximise, (0.0, 1.0)), None);
-        assert!((miss.gain(Goal::Minimise, (0.0, 1.0)).expect("a gain") - 0.1).abs() < 1e-15);
-        // Less than a hundred times the excess; but any that keeps the bounds is better than one that does not.
-        assert_eq!(miss.gain(Goal::Minimise, (0.0, 0.905)), None);
-        assert!(miss.gain(Goal::Minimise, (1e-5, 0.8)).is_some());
+        assert!(of(1e-7, 0.0, -1.0).is_none() && of(2e-2, 0.0, -1.0).is_none());
+        let gain = |miss: &Option<NearMiss>, best| miss.as_ref().expect("near").gain(best);
+        // By .5 %, and .0063 back.
+        let flat = of(5e-3, 0.0, -1.0);
+        assert!((gain(&flat, (0.0, 1.0)).expect("a gain") - 0.1).abs() < 1e-15);
+        assert_eq!(gain(&flat, (0.0, 0.9005)), None, "less than an evaluation is worth");
+        let steep = of(5e-3, -5.0, -1.0);
+        let promised = gain(&steep, (0.0, 1.0)).expect("a gain");
+        assert!((promised - (0.1 - 5.0 * (5e-3 + 1.3e-3))).abs() < 1e-4, "{promised}");
+        assert_eq!(gain(&of(5e-3, -20.0, -1.0), (0.0, 1.0)), None, "the step back loses it");
+        // Without one only what is a hundred times the excess; but any that keeps the bounds is better than one that does not.
+        let held = of(5e-3, 0.0, 0.0);
+        assert_eq!(gain(&held, (0.0, 1.0)), None);
+        assert!(gain(&held, (1e-5, 0.8)).is_some());
     }
 }

@@ -153,6 +153,11 @@ impl<'a> Run<'a> {
         self.best.as_ref().map(|best| (best.violation, best.objective))
     }
 
+    /// Violation of the best design, and its value as the method sees it.
+    pub(super) fn incumbent_sample(&self) -> Option<(f64, f64)> {
+        self.best.as_ref().map(|best| (best.violation, best.sample.value))
+    }
+
     /// Whether there are designs, and none keeps all constraints.
     pub(super) fn violates(&self) -> bool {
         self.best.as_ref().is_some_and(|best| best.violation > 0.0)
@@ -239,7 +244,9 @@ impl<'a> Run<'a> {
         }
         self.latest = Some(sample.clone());
         self.repeated = 0;
-        self.near_misses.extend(NearMiss::of(&record, &sample));
+        let bounds = [self.shape().lower(), self.shape().upper()];
+        let miss = NearMiss::of(&record, &sample, bounds);
+        self.near_misses.extend(miss);
         if comparison.is_improved() {
             self.best = Some(Incumbent {
                 evaluation: record.row.evaluation,
@@ -250,8 +257,8 @@ impl<'a> Run<'a> {
                 field: field(),
             });
         }
-        let (goal, values) = (self.goal, self.incumbent_values());
-        self.near_misses.retain(|miss| values.is_none_or(|best| miss.gain(goal, best).is_some()));
+        let values = self.incumbent_sample();
+        self.near_misses.retain(|miss| values.is_none_or(|best| miss.gain(best).is_some()));
     }
 
     /// Says which bounds the initial design does not keep.

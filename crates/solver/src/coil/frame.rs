@@ -51,7 +51,7 @@ impl Frame {
             })
             .filter(|across| norm(*across) > PARALLEL)
             .and_then(normalise)
-            .ok_or_else(|| refuse("direction", wanted, "a vector with a length across the coil's axis"))?;
+            .ok_or_else(|| refuse("direction", wanted, "a vector with a length across the axis"))?;
         Ok(Self { centre, directions: [first, cross(normal, first), normal] })
     }
 
@@ -123,7 +123,7 @@ mod tests {
         let error = Frame::new([0.0; 3], [0.0; 3], None).unwrap_err();
         assert!(error.to_string().starts_with("axis = [0.0, 0.0, 0.0]"), "{error}");
         let error = Frame::new([0.0; 3], [1.0, 1.0, 0.0], Some([-2.0, -2.0, 0.0])).unwrap_err();
-        assert!(error.to_string().contains("across the coil's axis"), "{error}");
+        assert!(error.to_string().contains("across the axis"), "{error}");
         assert!(Frame::coordinate([0.0; 3], 3).is_err());
     }
 }

@@ -47,7 +47,7 @@ impl Compared {
 /// The figures of a field's homogeneity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldQuality {
-    /// `|b̄|` [T].
+    /// `|b̄|` [T]; of a component that does not alternate `b̄`, with its sign.
     pub mean: f64,
     /// The relative rms deviation from the mean [1].
     pub rms: f64,
@@ -136,7 +136,11 @@ impl<'a> Spread<'a> {
         let values = self.compared.iter().map(along);
         let (least, most) =
             values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), v| (least.min(v), most.max(v)));
-        FieldQuality { mean: square.sqrt(), rms: self.variance().sqrt(), peak_to_peak: most - least }
+        let mean = match self.of {
+            Compared::Component(_) if self.mean[0].im == 0.0 => self.mean[0].re,
+            _ => square.sqrt(),
+        };
+        FieldQuality { mean, rms: self.variance().sqrt(), peak_to_peak: most - least }
     }
 }
 

@@ -12,6 +12,9 @@ use crate::config::value::range::Range;
 /// Ratios that end: cells that do not grow would fill the air.
 const GROWTHS: Range = Range::closed(1.01, 100.0);
 
+/// The surfaces that every such mesh has.
+const OUTER_FACES: [&str; 6] = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"];
+
 table! {
     /// Any device with faces along the axes: boxes of regions, laid one over the other on a graded grid. Every face of every
     /// box lies on mesh lines. Sizes are upper limits; away from the places that have one, cells grow by a constant ratio, so
@@ -74,7 +77,7 @@ table! {
         size: Option<[f64; 3]> = length_per_axis(POSITIVE);
         /// Largest first cell on either side of the box's faces, across x, y and z [m]. Default: no limit.
         skin: Option<[f64; 3]> = length_per_axis(POSITIVE);
-        /// Observation cells along x, y and z; a mesh cell lies in one of them. Default: every element is one.
+        /// Observation cells along x, y and z; a mesh cell lies in one of them. Default: every element is one; beside boxes of its name that have some, the whole box.
         cells: Option<[usize; 3]> = integer(1, 1000);
     }
 }
@@ -147,6 +150,10 @@ impl BoxesMesh {
             let Some(table) = section.inner(&format!("surfaces[{index}]")) else { continue };
             if let (Some(corners), Some(whole)) = (flat_box(&table, "box", patch.corners), whole) {
                 check_within(&table, "box", corners, whole);
+            }
+            if OUTER_FACES.contains(&patch.name.as_str()) {
+                let message = format!("`{}` is the name of an outer face of the mesh", patch.name);
+                table.wrong("name", message, "a name of its own");
             }
         }
         let twice = (1..self.surfaces.len())
