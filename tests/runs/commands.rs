@@ -193,18 +193,23 @@ fn a_probe_that_the_moving_plate_swallows_is_left_out_of_the_result() {
 
 /// Where B jumps, a point on the face has the field of one side.
 #[test]
-fn a_probe_on_a_face_of_iron_is_asked_about() {
-    let said = |text: &str, depth: &str, permeability: &str| {
-        let point = format!("probes[0].points=[[\"10 mm\", \"10 mm\", \"{depth}\"]]");
+fn a_probe_on_a_face_of_iron_or_at_its_edge_is_asked_about() {
+    let warnings = |point: &str, permeability: &str| {
+        let point = format!("probes[0].points=[[{point}]]");
         let material = format!("materials.steel.relative_permeability={permeability}");
         let further = ["--json", "--set", &point, "--set", &material, "--set", "regions.plate.model=volume"];
         let checked = finish(command(&[&"check", &quick()]).args(further)).exits_with(0).json();
-        checked["warnings"].to_string().contains(text)
+        checked["warnings"].to_string()
     };
+    let [on_the_face, beside_the_edge] = [".01, .01, -.01", ".1203, .01, -.0103"];
     let named = "between `remesh` and `plate`, where B jumps: it is that in `remesh`";
-    assert!(said(named, "-10 mm", "100"));
-    for (depth, permeability) in [("-10 mm", "1"), ("-11 mm", "100"), ("-9 mm", "100")] {
-        assert!(!said("B jumps", depth, permeability), "{depth}, {permeability}");
+    assert!(warnings(on_the_face, "100").contains(named));
+    assert!(warnings(beside_the_edge, "100").contains("is 0.424 mm from an edge of iron"));
+    let silent =
+        [(on_the_face, "1"), (beside_the_edge, "1"), (".01, .01, -.011", "100"), (".01, .01, -.009", "100")];
+    for (point, permeability) in silent {
+        let all = warnings(point, permeability);
+        assert!(!all.contains("B jumps") && !all.contains("edge of iron"), "{point}, {permeability}: {all}");
     }
 }
 

@@ -136,7 +136,7 @@ fn disturbance(
     mesh: &Mesh,
 ) -> Result<Option<(String, &'static str)>, Error> {
     let planes = planes(config, set, mesh)?;
-    let bounds = AxisBox::around(&mesh.bounding_box());
+    let bounds = AxisBox::around(mesh.bounding_box());
     let disturbed = Multipoles::disturbance(problem.states(), mesh, &expansion(set)?, &planes);
     // Beyond the box of the mesh it is no hole.
     Ok(disturbed.filter(|(place, _)| bounds.contains(*place)).map(|(place, what)| {

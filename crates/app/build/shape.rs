@@ -110,7 +110,7 @@ fn mean_extent(mesh: &Mesh, triangles: &[[NodeId; 3]], axis: usize) -> f64 {
     let (mut sum, mut whole) = (0.0, 0.0);
     for triangle in triangles {
         let corners = triangle.map(|n| mesh.point(n));
-        let (area, around) = (norm(area_vector(corners)), AxisBox::around(&corners));
+        let (area, around) = (norm(area_vector(corners)), AxisBox::around(corners));
         sum += area * (around.upper[axis] - around.lower[axis]);
         whole += area;
     }

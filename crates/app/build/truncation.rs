@@ -303,17 +303,17 @@ fn size(whole: &AxisBox, places: &[&Site], planes: &[&Side]) -> f64 {
         pairs.iter().fold(AxisBox::around(&points), |all, pair| all.with(&around_edge(*pair, x)))
     };
     let extremes = places.iter().flat_map(|place| place.extremes()).map(meshed);
-    let all = extremes.fold(AxisBox::around(&[]), |all, x| all.with(&images(x)));
+    let all = extremes.fold(AxisBox::around(std::iter::empty::<Point>()), |all, x| all.with(&images(x)));
     0.5 * norm(sub(all.upper, all.lower))
 }
 
 /// The box around all images of a point in a sector between two planes, which lie on a circle; around the point alone where they meet
 /// at right angles.
 fn around_edge([first, second]: [&Side; 2], x: Point) -> AxisBox {
-    let (Some(n), Some(m)) = (first.normal, second.normal) else { return AxisBox::around(&[x]) };
+    let (Some(n), Some(m)) = (first.normal, second.normal) else { return AxisBox::around([x]) };
     let cosine = dot(n, m);
     if cosine.abs() <= RIGHT {
-        return AxisBox::around(&[x]);
+        return AxisBox::around([x]);
     }
     // The foot of the point on the edge has both distances zero.
     let [b, c] = [first, second].map(|side| side.beyond(x));

@@ -133,7 +133,7 @@ impl BoxTree {
     }
 
     fn grow(&mut self, order: &mut [u32], first: usize) {
-        let none = AxisBox::around(&[]);
+        let none = AxisBox::around(std::iter::empty::<Point>());
         let around = order.iter().fold(none, |all, &i| all.with(&self.boxes[i as usize]));
         let here = self.branches.len();
         let range = [first as u32, (first + order.len()) as u32];
@@ -239,7 +239,7 @@ mod tests {
     }
 
     fn boxes() -> Vec<AxisBox> {
-        let grown = |(k, &x): (usize, &Point)| AxisBox::around(&[x]).grown(0.01 * (k % 9) as f64);
+        let grown = |(k, &x): (usize, &Point)| AxisBox::around([x]).grown(0.01 * (k % 9) as f64);
         places().iter().enumerate().map(grown).collect()
     }
 
@@ -286,7 +286,7 @@ mod tests {
         for k in 0..200 {
             // Every fourth place is a node, and many lie in the middle between two, four or eight.
             let point = [0.05 * (k % 11) as f64, 0.05 * (k % 13) as f64, 0.05 * (k % 17) as f64];
-            let distance = |i: usize| AxisBox::around(&[places[i]]).square_distance(point);
+            let distance = |i: usize| AxisBox::around([places[i]]).square_distance(point);
             let all = (0..places.len()).map(|i| (distance(i), i)).min_by(|a, b| a.0.total_cmp(&b.0));
             assert_eq!(tree.nearest(point), all.map(|(distance, i)| (i, distance)));
         }

@@ -11,7 +11,7 @@ use crate::tet4::{Point, add, dot, norm, sub};
 /// at least `far`. Infinite without triangles.
 pub fn depths(mesh: &Mesh, triangles: &[[NodeId; 3]], points: &[Point], far: f64) -> Vec<f64> {
     let corners: Vec<[Point; 3]> = triangles.iter().map(|t| t.map(|n| mesh.point(n))).collect();
-    let tree = BoxTree::new(corners.iter().map(|c| AxisBox::around(c)).collect());
+    let tree = BoxTree::new(corners.iter().map(AxisBox::around).collect());
     let depth = |&point: &Point| {
         let Some((first, square)) = tree.nearest(point) else { return f64::INFINITY };
         if square >= far * far {

@@ -43,7 +43,7 @@ pub fn holders(mesh: &Mesh, points: &[Point]) -> Vec<(usize, Located)> {
         .with_min_len(1024)
         .fold(Vec::new, |mut inside, e| {
             let vertices = mesh.vertices(e);
-            let tight = AxisBox::around(&vertices);
+            let tight = AxisBox::around(vertices);
             let around = tight.grown(BOX_MARGIN * tight.extent());
             let mut near = Vec::new();
             tree.for_each(|own| own.meets(&around), |i| near.push(i));

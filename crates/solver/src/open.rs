@@ -196,8 +196,7 @@ const MISS: f64 = 1e-7;
 
 impl Faces {
     fn new(triangles: Vec<[Point; 3]>) -> Self {
-        let boxes =
-            triangles.iter().map(|t| AxisBox::around(t)).map(|b| b.grown(MISS * b.extent())).collect();
+        let boxes = triangles.iter().map(AxisBox::around).map(|b| b.grown(MISS * b.extent())).collect();
         Self { triangles, tree: BoxTree::new(boxes) }
     }
 

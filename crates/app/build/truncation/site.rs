@@ -31,7 +31,7 @@ pub(super) enum Form {
 
 impl Site {
     pub(super) fn new(form: Form) -> Self {
-        Self { bounds: AxisBox::around(&form.extremes()), form }
+        Self { bounds: AxisBox::around(form.extremes()), form }
     }
 
     /// Nodes of a mesh, each once or more often.

@@ -145,6 +145,11 @@ fn keys_of_the_limit(rules: Rules) -> Rules {
     for (word, kind, _) in ObjectiveKind::choices() {
         let former = ObjectiveKind::FORMER.iter().filter(|(_, now)| *now == word).map(|(former, _)| *former);
         let is_kind = is("kind", &std::iter::once(word).chain(former).collect::<Vec<_>>());
+        if let Some([least, most]) = kind.limits() {
+            let bound = json!({ "minimum": least, "maximum": most });
+            let bounds = json!({ "upper": bound, "lower": bound });
+            rules = rules.add(json!({ "if": is_kind.clone(), "then": { "properties": bounds } }));
+        }
         let [usual, over_volume] = [None, Some(Weighting::Volume)].map(|weighting| kind.dimension(weighting));
         if usual == over_volume {
             units.push((is_kind, usual, kind.range()));
@@ -297,7 +302,11 @@ impl Limit {
             && (value < least || value > most)
         {
             let key = if matches!(bound, ValueBound::AtMost(_)) { "upper" } else { "lower" };
-            let message = format!("`{}.{key}` is {value}, and no {} is", section.path(), kind.name());
+            let message = format!(
+                "`{}.{key}` is {value}, which is out of range for the kind `{}`",
+                section.path(),
+                kind.name()
+            );
             section.wrong(key, message, format!("from {least} to {most}"));
         }
         Self::Functional { functional, bound }

@@ -100,6 +100,13 @@ pub fn boxes(parameters: &BoxesParameters) -> Result<Mesh, MeshError> {
     }
     let points = grid.points();
     for patch in &parameters.surfaces {
+        if topology.surface(&patch.name).is_ok() {
+            return Err(MeshError::Parameter {
+                parameter: "boxes.surfaces",
+                value: format!("`{}`, which is an outer face of the mesh or an earlier patch", patch.name),
+                expected: "a name of its own".into(),
+            });
+        }
         let triangles = patch_triangles(patch, &topology, &points, tolerance(parameters));
         if triangles.is_empty() {
             return Err(MeshError::Parameter {
@@ -350,6 +357,10 @@ mod tests {
         parameters.surfaces = vec![patch("nowhere", [[5.0; 3], [6.0; 3]])];
         let refused = boxes(&parameters).expect_err("no face lies there").to_string();
         assert!(refused.contains("boxes.surfaces") && refused.contains("`nowhere`"), "{refused}");
+        let top = [[-1.0, -1.0, 1.0], [1.0, 1.0, 1.0]];
+        parameters.surfaces = vec![patch("x_max", top)];
+        let refused = boxes(&parameters).expect_err("the name of a side").to_string();
+        assert!(refused.contains("`x_max`, which is an outer face"), "{refused}");
     }
 
     #[test]

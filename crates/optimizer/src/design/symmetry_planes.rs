@@ -208,7 +208,7 @@ impl SymmetryPlanes {
 
     /// Every product of the reflections that brings a point near the box around all; `None` where there are too many.
     fn images(&self, own: &[Seen], distance: f64) -> Option<Vec<Seen>> {
-        let around = AxisBox::around(&own.iter().map(|seen| seen.place).collect::<Vec<_>>());
+        let around = AxisBox::around(own.iter().map(|seen| seen.place).collect::<Vec<_>>());
         let AxisBox { lower, upper } = around;
         let (centre, size) = (std::array::from_fn(|d| 0.5 * (lower[d] + upper[d])), norm(sub(upper, lower)));
         let near = around.grown(distance);

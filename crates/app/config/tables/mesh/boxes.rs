@@ -12,9 +12,6 @@ use crate::config::value::range::Range;
 /// Ratios that end: cells that do not grow would fill the air.
 const GROWTHS: Range = Range::closed(1.01, 100.0);
 
-/// The surfaces that every such mesh has.
-const OUTER_FACES: [&str; 6] = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"];
-
 table! {
     /// Any device with faces along the axes: boxes of regions, laid one over the other on a graded grid. Every face of every
     /// box lies on mesh lines. Sizes are upper limits; away from the places that have one, cells grow by a constant ratio, so
@@ -150,10 +147,6 @@ impl BoxesMesh {
             let Some(table) = section.inner(&format!("surfaces[{index}]")) else { continue };
             if let (Some(corners), Some(whole)) = (flat_box(&table, "box", patch.corners), whole) {
                 check_within(&table, "box", corners, whole);
-            }
-            if OUTER_FACES.contains(&patch.name.as_str()) {
-                let message = format!("`{}` is the name of an outer face of the mesh", patch.name);
-                table.wrong("name", message, "a name of its own");
             }
         }
         let twice = (1..self.surfaces.len())
