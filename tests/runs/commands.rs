@@ -201,12 +201,16 @@ fn a_probe_on_a_face_of_iron_or_at_its_edge_is_asked_about() {
         let checked = finish(command(&[&"check", &quick()]).args(further)).exits_with(0).json();
         checked["warnings"].to_string()
     };
-    let [on_the_face, beside_the_edge] = [".01, .01, -.01", ".1203, .01, -.0103"];
+    let [on_the_face, beside_the_edge] = ["0.01, 0.01, -0.01", "0.1203, 0.01, -0.0103"];
     let named = "between `remesh` and `plate`, where B jumps: it is that in `remesh`";
     assert!(warnings(on_the_face, "100").contains(named));
     assert!(warnings(beside_the_edge, "100").contains("is 0.424 mm from an edge of iron"));
-    let silent =
-        [(on_the_face, "1"), (beside_the_edge, "1"), (".01, .01, -.011", "100"), (".01, .01, -.009", "100")];
+    let silent = [
+        (on_the_face, "1"),
+        (beside_the_edge, "1"),
+        ("0.01, 0.01, -0.011", "100"),
+        ("0.01, 0.01, -0.009", "100"),
+    ];
     for (point, permeability) in silent {
         let all = warnings(point, permeability);
         assert!(!all.contains("B jumps") && !all.contains("edge of iron"), "{point}, {permeability}: {all}");

@@ -470,14 +470,15 @@ fn degrees_without_their_unit_are_asked_about() {
     assert!(!check(&["coils[0].phase=90 deg"]).contains("turns"));
 }
 
-/// A loss adds up over frequencies, a mean of the field does not.
+/// A loss adds up over loads, a mean of the field does not.
 #[test]
 fn a_bound_on_a_sum_over_states_is_asked_about() {
     let field = "constraints=[{kind=\"field_component\", region=\"observation\", direction=[0, 0, 1], upper=\"1 T\"}]";
     let said = "bounds the sum of the field_component over 2 states, and none by itself";
-    let of = |constraint: &str| check(&["analysis={frequencies=[\"50 Hz\", \"60 Hz\"]}", constraint]);
+    let of =
+        |constraint: &str| check(&["loads=[{name=\"a\"}, {name=\"b\", frequency=\"50 Hz\"}]", constraint]);
     assert!(of(field).contains(said));
-    let of_one = field.replace("upper", "frequency=\"50 Hz\", upper");
+    let of_one = field.replace("upper", "load=\"a\", upper");
     let loss = "constraints=[{kind=\"loss\", region=\"plate\", upper=\"1 W\"}]";
     assert!(!of(&of_one).contains("sum") && !of(loss).contains("sum"));
 }

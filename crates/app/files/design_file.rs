@@ -89,18 +89,16 @@ impl DesignFile {
     /// What its run had otherwise than a configuration of this text and a mesh, in words.
     pub fn changes_since_the_run(&self, text: &str, mesh: &MeshHash) -> Vec<String> {
         let Some((folder, manifest)) = &self.run else { return Vec::new() };
-        let [config, own] =
-            [manifest.config.as_ref().map(|own| &own.blake3), manifest.mesh.as_ref().map(|own| &own.blake3)];
-        let is_other = [
-            ("config.toml", config.is_some_and(|hash| *hash != blake3_hex(text.as_bytes()))),
-            ("mesh", own.is_some_and(|hash| *hash != mesh.blake3)),
-        ];
-        let changed = is_other.into_iter().filter(|(_, is_other)| *is_other);
-        let run = folder.display();
+        let of_config = manifest.config.as_ref().map(|own| (&own.blake3, blake3_hex(text.as_bytes())));
+        let of_mesh = manifest.mesh.as_ref().map(|own| (&own.blake3, mesh.blake3.clone()));
+        let pairs = [("config.toml", of_config), ("mesh", of_mesh)];
+        let is_other = |pair: Option<(&String, String)>| pair.is_some_and(|(was, is)| *was != is);
+        let changed = pairs.into_iter().filter_map(|(what, pair)| is_other(pair).then_some(what));
         changed
-            .map(|(what, _)| {
+            .map(|what| {
                 format!(
-                    "the {what} is another than when `{run}` was run: these are not the numbers of that run"
+                    "the {what} is another than when `{}` was run: these are not the numbers of that run",
+                    folder.display()
                 )
             })
             .collect()
@@ -254,5 +252,24 @@ mod tests {
         design.check_tables(&read("other.csv", "b")).expect("another material");
         let error = design.check_tables(&read("steel.csv", "b")).expect_err("changed").to_string();
         assert!(error.contains("the B–H table `steel.csv` is another"), "{error}");
+    }
+
+    #[test]
+    fn another_configuration_and_another_mesh_than_those_of_its_run_are_named() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("result.json");
+        std::fs::write(&path, "[0.01]").expect("written");
+        let mesh =
+            |hash: &str| MeshHash { origin: "block".into(), blake3: hash.to_owned(), nodes: 8, tets: 6 };
+        let design = read_design(&path, 1).expect("a design");
+        assert!(design.changes_since_the_run("text", &mesh("a")).is_empty(), "of no run");
+        let config = Some(FileHash { path: "config.toml".into(), blake3: blake3_hex(b"text") });
+        let run = Manifest { config, mesh: Some(mesh("a")), ..Manifest::new("run", 1) };
+        let design = design.of_run(Some(("run".into(), run)));
+        assert!(design.changes_since_the_run("text", &mesh("a")).is_empty());
+        let changes = design.changes_since_the_run("other", &mesh("b"));
+        assert!(
+            matches!(&changes[..], [config, mesh] if config.contains("the config.toml is") && mesh.contains("the mesh is"))
+        );
     }
 }
