@@ -1,8 +1,9 @@
 //! `--design`: a result is solved again as the run came to it, and that of another device is refused.
 
+use crate::support::changed;
 use crate::support::device::{HYPERELASTIC, LINEAR, THROUGH_THE_GAP, shipped, written};
-use crate::support::folder::{RunFolder, count, number};
-use crate::support::program::{command, finish, folder};
+use crate::support::folder::{RunFolder, count, number, read_text};
+use crate::support::program::{command, finish, fluxmorph, folder};
 
 /// By every law, of a face that the mesh does not carry to its bound.
 #[test]
@@ -24,6 +25,22 @@ fn the_result_of_a_run_is_solved_again_to_the_last_bit() {
             assert_eq!(own["mesh"]["worst_quality_final"], result["mesh"]["worst_quality_final"]);
             assert_eq!(own["design"], result["design"]);
         }
+    }
+}
+
+#[test]
+fn a_configuration_that_has_changed_since_the_run_is_named() {
+    let home = folder();
+    let [run, solved] = ["run", "solved"].map(|name| home.path().join(name));
+    finish(&mut written("device", home.path(), &[]).command("run", &run)).completed();
+    let config = run.join("config.toml");
+    let text = read_text(&config);
+    let said = "the config.toml is another than when";
+    let stronger = changed(&text, &[("b = [0.0, 0.0, 0.1]", "b = [0.0, 0.0, 0.2]")]);
+    for (text, is_said) in [(format!("{text}# A word.\n"), false), (stronger, true)] {
+        std::fs::write(&config, text).expect("written");
+        let again = fluxmorph(&[&"solve", &run.join("result.json"), &"--out", &solved, &"--force"]);
+        assert_eq!(again.exits_with(0).stderr.contains(said), is_said);
     }
 }
 

@@ -159,8 +159,7 @@ fn nodes_of(
     Ok(nodes)
 }
 
-/// Distance of a point from the line between two others.
-/// Distance of a point from a line between two [m].
+/// Distance of a point from the line between two others [m].
 pub(super) fn distance_to_line(point: Point, [start, end]: [Point; 2]) -> f64 {
     let (along, from) = (sub(end, start), sub(point, start));
     let square = dot(along, along);

@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::curved::SMOOTH;
-use fluxmorph_geometry::locate::{Located, holders, locate};
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm, volume};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
+use fluxmorph_geometry::locate::{holders, locate};
+use fluxmorph_geometry::tet4::{Point, dot, volume};
+use fluxmorph_geometry::{ElementId, Mesh, NodeId, millimetres};
 
 use super::entries::material;
 use super::motion::distance_to_line;
 use super::open;
+use super::soundness::normal;
 use crate::config::{Config, Diagnostic, ElementOrder, Probe, SourceMap};
 
 /// Every probe point outside the mesh, in a region that its surface replaces, or in the shell of open space.
@@ -45,85 +46,114 @@ pub(super) fn faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh
     faults
 }
 
-/// Probes with points on faces across which B jumps: that of one side is measured there.
+/// Probes with points on faces across which B jumps, where that of one side is measured, and beside edges.
 pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
-    let regions = mesh.topology().region_names();
-    let name = |region: RegionId| regions[region.index()].as_str();
-    let points: Vec<Point> = config.probes.iter().flat_map(|probe| probe.points.iter().copied()).collect();
-    // The first region at a point is that of the first element, whose field is taken.
-    let mut around: Vec<Vec<RegionId>> = vec![Vec::new(); points.len()];
-    for (i, (e, _)) in holders(mesh, &points) {
-        around[i].push(mesh.topology().region_of()[e.index()]);
+    if config.probes.is_empty() {
+        return Vec::new();
     }
-    let mut around = around.iter();
-    let mut warnings = edge_warnings(config, mesh);
+    let points: Vec<Point> = config.probes.iter().flat_map(|probe| probe.points.iter().copied()).collect();
+    // By ascending element: the field is taken in the first one.
+    let mut around: Vec<Vec<ElementId>> = vec![Vec::new(); points.len()];
+    for (i, (e, _)) in holders(mesh, &points) {
+        around[i].push(e);
+    }
+    let mut around = &around[..];
+    let edges = Edges::of(config, mesh);
+    let mut warnings = Vec::new();
     for probe in &config.probes {
-        let mut between: BTreeMap<[&str; 2], Vec<usize>> = BTreeMap::new();
-        for (j, regions) in around.by_ref().take(probe.points.len()).enumerate() {
-            let Some(&first) = regions.first() else { continue };
-            let taken = name(first);
-            if let Some(other) = regions.iter().find(|&&other| flux_density_jumps(config, taken, name(other)))
-            {
-                between.entry([taken, name(*other)]).or_default().push(j);
-            }
-        }
-        warnings.extend(between.into_iter().map(|([taken, other], points)| {
-            let more = match points.len() - 1 {
-                0 => String::new(),
-                more => format!(", and {more} more of them,"),
-            };
-            format!(
-                "the point {}{more} of the probe `{}` lies between `{taken}` and `{other}`, where B jumps: it is that in `{taken}`; move it \
-                 to the side that is meant",
-                millimetres(probe.points[points[0]]),
-                probe.name
-            )
-        }));
+        let (own, others) = around.split_at(probe.points.len());
+        around = others;
+        warnings.extend(edges.warning(probe, own));
+        warnings.extend(face_warnings(config, mesh, probe, own));
     }
     warnings
 }
 
-/// Probes with points nearer to an edge of iron or of a magnet than the elements there can tell.
+/// Points of a probe on faces across which B jumps; `around` has the elements at each.
+fn face_warnings(config: &Config, mesh: &Mesh, probe: &Probe, around: &[Vec<ElementId>]) -> Vec<String> {
+    let topology = mesh.topology();
+    let name = |e: ElementId| topology.region_names()[topology.region_of()[e.index()].index()].as_str();
+    let mut between: BTreeMap<[&str; 2], Vec<usize>> = BTreeMap::new();
+    for (j, elements) in around.iter().enumerate() {
+        let Some(taken) = elements.first().map(|&e| name(e)) else { continue };
+        let other = elements.iter().map(|&e| name(e)).find(|other| flux_density_jumps(config, taken, other));
+        if let Some(other) = other {
+            between.entry([taken, other]).or_default().push(j);
+        }
+    }
+    let warning = |([taken, other], points): ([&str; 2], Vec<usize>)| {
+        format!(
+            "the point {}{} of the probe `{}` lies between `{taken}` and `{other}`, where B jumps: it is that in `{taken}`; move it \
+             to the side that is meant",
+            millimetres(probe.points[points[0]]),
+            and_more(points.len(), ""),
+            probe.name
+        )
+    };
+    between.into_iter().map(warning).collect()
+}
+
+/// Behind the first of so many points: that there are others.
+fn and_more(count: usize, how: &str) -> String {
+    match count - 1 {
+        0 => String::new(),
+        more => format!(", and {more} more of them{how},"),
+    }
+}
+
+/// Edges of iron and of magnets.
 ///
 /// Towards an edge of 270° of air B grows with the distance d as d^(−1/3) (Jackson, Classical Electrodynamics, 2.11); recovered in
 /// elements of size h it has what it has at h/2, in both orders that an estimate compares.
-fn edge_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
-    let edges = sharp_edges(config, mesh);
-    let tree = BoxTree::new(edges.iter().map(AxisBox::around).collect());
-    let order = if config.analysis.order == ElementOrder::Quadratic { 2.0 } else { 1.0 };
-    let near = |(point, located): (&Point, Option<Located>)| {
-        let (e, _) = located?;
-        let size = (6.0 * volume(mesh.vertices(e))).cbrt() / order;
+struct Edges<'a> {
+    mesh: &'a Mesh,
+    ends: Vec<[Point; 2]>,
+    tree: BoxTree,
+    /// Elements of this order have the field of so many along each axis.
+    order: f64,
+}
+
+impl<'a> Edges<'a> {
+    fn of(config: &Config, mesh: &'a Mesh) -> Self {
+        let ends = sharp_edges(config, mesh);
+        let tree = BoxTree::new(ends.iter().map(AxisBox::around).collect());
+        let order = if config.analysis.order == ElementOrder::Quadratic { 2.0 } else { 1.0 };
+        Self { mesh, ends, tree, order }
+    }
+
+    /// The distance of a point in an element from an edge, in sizes of the element, and that size; `None` where the element can tell
+    /// the two apart.
+    fn near(&self, point: Point, element: ElementId) -> Option<(f64, f64)> {
+        let size = (6.0 * volume(self.mesh.vertices(element))).cbrt() / self.order;
         let reach = 0.5 * size;
         let mut least = f64::INFINITY;
-        tree.for_each(
-            |around| around.square_distance(*point) < reach * reach,
-            |k| least = least.min(distance_to_line(*point, edges[k])),
+        self.tree.for_each(
+            |around| around.square_distance(point) < reach * reach,
+            |k| least = least.min(distance_to_line(point, self.ends[k])),
         );
-        (least < reach).then_some((*point, least, size))
-    };
-    let warning = |probe: &Probe| {
-        let all: Vec<_> = probe.points.iter().zip(locate(mesh, &probe.points)).filter_map(near).collect();
-        let share = |&(_, distance, size): &(Point, f64, f64)| distance / size;
-        let worst = all.iter().min_by(|a, b| share(a).total_cmp(&share(b)))?;
-        let &(point, distance, size) = worst;
-        let more = match all.len() - 1 {
-            0 => String::new(),
-            more => format!(", and {more} more of them less so,"),
+        (least < reach).then_some((least / size, size))
+    }
+
+    /// What to say of a probe with points nearer to an edge than the elements there can tell.
+    fn warning(&self, probe: &Probe, around: &[Vec<ElementId>]) -> Option<String> {
+        let near = |(point, elements): (&Point, &Vec<ElementId>)| {
+            Some((*point, self.near(*point, *elements.first()?)?))
         };
+        let all: Vec<_> = probe.points.iter().zip(around).filter_map(near).collect();
+        let &(point, (share, size)) = all.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
         // At the edge itself there is no number.
-        let factor = (2.0 * distance / size).max(1e-3).powf(-1.0 / 3.0);
+        let factor = (2.0 * share).max(1e-3).powf(-1.0 / 3.0);
         Some(format!(
-            "the point {}{more} of the probe `{}` is {:.3} mm from an edge of iron or of a magnet, in elements of {:.3} mm: B grows \
+            "the point {}{} of the probe `{}` is {:.3} mm from an edge of iron or of a magnet, in elements of {:.3} mm: B grows \
              without limit towards an edge, and is up to {factor:.1} times as large as what such elements have there, which no \
              error bar counts; take smaller elements, or a point farther away",
             millimetres(point),
+            and_more(all.len(), " less so"),
             probe.name,
-            1e3 * distance,
-            1e3 * size * order
+            1e3 * share * size,
+            1e3 * size * self.order
         ))
-    };
-    config.probes.iter().filter_map(warning).collect()
+    }
 }
 
 /// The edges at which faces across which B jumps meet at an angle, or more than two of them. Where one ends at the outside of the mesh
@@ -146,8 +176,7 @@ fn sharp_edges(config: &Config, mesh: &Mesh) -> Vec<[Point; 2]> {
         }
         let [a, b, c] = facet.nodes;
         let out_of_the_first = if inside < outside { 1.0 } else { -1.0 };
-        let area = area_vector(facet.nodes.map(|n| mesh.point(n)));
-        let normal = area.map(|component| out_of_the_first * component / norm(area));
+        let normal = normal(mesh, facet.nodes).map(|component| out_of_the_first * component);
         for [m, n] in [[a, b], [b, c], [c, a]] {
             normals.entry([m.min(n), m.max(n)]).or_default().push(normal);
         }

@@ -10,7 +10,7 @@ use crate::build::{Mode, variable_count};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
 use crate::exit_code::ExitCode;
-use crate::files::{Manifest, RunDirectory, read_design, system_disk};
+use crate::files::{Manifest, RunDirectory, RunOfDesign, read_design, system_disk};
 use crate::run;
 
 /// What is analysed.
@@ -19,8 +19,8 @@ struct Subject {
     source: SourceMap,
     /// The file of the design; `None` for the initial one.
     design: Option<PathBuf>,
-    /// The folder of the run of the configuration, and its manifest; `None` without a run.
-    of_run: Option<(PathBuf, Manifest)>,
+    /// The run of the configuration; `None` without one.
+    of_run: Option<RunOfDesign>,
 }
 
 /// The configuration to analyse, and the design file: of the result of a run, its configuration and its design.
@@ -37,13 +37,14 @@ fn subject(args: &SolveArgs) -> Result<Subject, Error> {
     let mut manifest = Manifest::read(&directory)?;
     manifest.overrides.extend(args.common.overrides.iter().cloned());
     let (mut config, source) = run::configuration(&directory, &manifest)?;
+    let has_its_configuration = run::journal::is_of_run(&directory, &manifest, (&config, &source))?;
     // Not into the run, which would have to be replaced.
     let mut beside = folder.as_os_str().to_owned();
     beside.push("_solved");
     config.output.directory = beside.into();
     let (config, source) = args.common.checked(config, source)?;
     let design = Some(args.design.clone().unwrap_or_else(|| path.clone()));
-    let of_run = Some((folder.to_owned(), manifest));
+    let of_run = Some(RunOfDesign { folder: folder.to_owned(), manifest, has_its_configuration });
     Ok(Subject { config, source, design, of_run })
 }
 

@@ -10,7 +10,7 @@ use fluxmorph_optimizer::design::DesignSurface;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{FileHash, Manifest, MeshHash, blake3_hex, json_place};
+use super::{FileHash, Manifest, MeshHash, json_place};
 use crate::config::{Diagnostic, DiagnosticReport, Document, LONGEST_LENGTH, Span, Subject};
 
 /// Largest design file that is read [bytes]: a million variables with their points.
@@ -65,6 +65,17 @@ pub enum DesignFileError {
 /// reading leave, and far below an element.
 const SAME_PLACE: f64 = 1e-6;
 
+/// The run whose configuration is analysed at its design, or at another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunOfDesign {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// What its manifest says of it.
+    pub manifest: Manifest,
+    /// Whether its configuration is still the one that it was run with.
+    pub has_its_configuration: bool,
+}
+
 /// A design as a file holds it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DesignFile {
@@ -75,27 +86,27 @@ pub struct DesignFile {
     points: Option<Vec<[f64; 3]>>,
     /// How often the run that the file is of refined its mesh.
     refinements: u64,
-    /// The folder of the run whose configuration is analysed, and its manifest; `None` without one.
-    run: Option<(PathBuf, Manifest)>,
+    /// The run whose configuration is analysed; `None` without one.
+    run: Option<RunOfDesign>,
 }
 
 impl DesignFile {
-    /// The same, for the configuration of the run in a folder with this manifest; `None` for that of no run.
+    /// The same, for the configuration of a run; `None` for that of no run.
     #[must_use]
-    pub fn of_run(self, run: Option<(PathBuf, Manifest)>) -> Self {
+    pub fn of_run(self, run: Option<RunOfDesign>) -> Self {
         Self { run, ..self }
     }
 
-    /// What its run had otherwise than a configuration of this text and a mesh, in words.
-    pub fn changes_since_the_run(&self, text: &str, mesh: &MeshHash) -> Vec<String> {
-        let Some((folder, manifest)) = &self.run else { return Vec::new() };
-        let of_config = manifest.config.as_ref().map(|own| (&own.blake3, blake3_hex(text.as_bytes())));
-        let of_mesh = manifest.mesh.as_ref().map(|own| (&own.blake3, mesh.blake3.clone()));
-        let pairs = [("config.toml", of_config), ("mesh", of_mesh)];
-        let is_other = |pair: Option<(&String, String)>| pair.is_some_and(|(was, is)| *was != is);
-        let changed = pairs.into_iter().filter_map(|(what, pair)| is_other(pair).then_some(what));
+    /// What its run had otherwise than its configuration and a mesh are now, in words.
+    pub fn changes_since_the_run(&self, mesh: &MeshHash) -> Vec<String> {
+        let Some(RunOfDesign { folder, manifest, has_its_configuration }) = &self.run else {
+            return Vec::new();
+        };
+        let is_other_mesh = manifest.mesh.as_ref().is_some_and(|own| own.blake3 != mesh.blake3);
+        let changed = [("config.toml", !has_its_configuration), ("mesh", is_other_mesh)];
+        let changed = changed.into_iter().filter(|(_, is_other)| *is_other);
         changed
-            .map(|what| {
+            .map(|(what, _)| {
                 format!(
                     "the {what} is another than when `{}` was run: these are not the numbers of that run",
                     folder.display()
@@ -114,12 +125,12 @@ impl DesignFile {
     /// # Errors
     /// [`DesignFileError::Table`].
     pub fn check_tables(&self, read: &BTreeMap<PathBuf, String>) -> Result<(), DesignFileError> {
-        let Some((run, Manifest { tables, .. })) = &self.run else { return Ok(()) };
+        let Some(RunOfDesign { folder, manifest, .. }) = &self.run else { return Ok(()) };
         let is_other =
             |own: &&FileHash| read.get(Path::new(&own.path)).is_some_and(|hash| *hash != own.blake3);
-        match tables.iter().find(is_other) {
+        match manifest.tables.iter().find(is_other) {
             None => Ok(()),
-            Some(own) => Err(DesignFileError::Table { run: run.clone(), table: PathBuf::from(&own.path) }),
+            Some(own) => Err(DesignFileError::Table { run: folder.clone(), table: PathBuf::from(&own.path) }),
         }
     }
 
@@ -246,8 +257,9 @@ mod tests {
         let design = read_design(&path, 1).expect("a design");
         design.check_tables(&read("steel.csv", "b")).expect("one of no run");
         let tables = vec![FileHash { path: "steel.csv".to_owned(), blake3: "a".to_owned() }];
-        let run = Manifest { tables, ..Manifest::new("run", 1) };
-        let design = design.of_run(Some(("run".into(), run)));
+        let manifest = Manifest { tables, ..Manifest::new("run", 1) };
+        let run = RunOfDesign { folder: "run".into(), manifest, has_its_configuration: true };
+        let design = design.of_run(Some(run));
         design.check_tables(&read("steel.csv", "a")).expect("its own");
         design.check_tables(&read("other.csv", "b")).expect("another material");
         let error = design.check_tables(&read("steel.csv", "b")).expect_err("changed").to_string();
@@ -262,12 +274,16 @@ mod tests {
         let mesh =
             |hash: &str| MeshHash { origin: "block".into(), blake3: hash.to_owned(), nodes: 8, tets: 6 };
         let design = read_design(&path, 1).expect("a design");
-        assert!(design.changes_since_the_run("text", &mesh("a")).is_empty(), "of no run");
-        let config = Some(FileHash { path: "config.toml".into(), blake3: blake3_hex(b"text") });
-        let run = Manifest { config, mesh: Some(mesh("a")), ..Manifest::new("run", 1) };
-        let design = design.of_run(Some(("run".into(), run)));
-        assert!(design.changes_since_the_run("text", &mesh("a")).is_empty());
-        let changes = design.changes_since_the_run("other", &mesh("b"));
+        assert!(design.changes_since_the_run(&mesh("a")).is_empty(), "of no run");
+        let manifest = Manifest { mesh: Some(mesh("a")), ..Manifest::new("run", 1) };
+        let run = |has_its_configuration: bool| RunOfDesign {
+            folder: "run".into(),
+            manifest: manifest.clone(),
+            has_its_configuration,
+        };
+        let design = design.of_run(Some(run(true)));
+        assert!(design.changes_since_the_run(&mesh("a")).is_empty());
+        let changes = design.of_run(Some(run(false))).changes_since_the_run(&mesh("b"));
         assert!(
             matches!(&changes[..], [config, mesh] if config.contains("the config.toml is") && mesh.contains("the mesh is"))
         );

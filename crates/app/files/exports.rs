@@ -35,9 +35,6 @@ pub(crate) fn write(
             Ok(bytes) => directory.write(optimum, &bytes)?,
             Err(error) => observer.warning(&format!("the mesh of the optimum is not written: {error}")),
         }
-    } else {
-        // Of an end before, where the run was resumed and is not asked for its mesh any more.
-        directory.remove(optimum)?;
     }
     for (name, file) in config.output.stl.iter().zip(surface_files(&config.output.stl)) {
         let triangles = oriented_outwards(config, mesh.topology(), name);

@@ -29,7 +29,7 @@ pub use accuracy::{
     Accuracy, CrossCheck, CurvedFacets, LEAST_LEFT_OUT, Level, SAFETY, Verdict, WHERE_LEFT_OUT, relative_bar,
 };
 pub(crate) use csv::csv_text;
-pub use design_file::{DesignFile, DesignFileError, read_design};
+pub use design_file::{DesignFile, DesignFileError, RunOfDesign, read_design};
 pub use disk::{Disk, DiskFile, DiskLock, Sharing, system_disk};
 pub use field_files::FieldForm;
 pub(crate) use finite::check_finite;

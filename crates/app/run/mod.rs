@@ -279,6 +279,9 @@ impl Session<'_> {
         let optimum = if is_refined { directory.optimum_refined() } else { directory.optimum() };
         exports::write(self.config, directory, &optimum, mesh, observer)?;
         // Of an end before, where the run was resumed and is not asked for them any more.
+        if !self.config.output.mesh {
+            directory.remove(&optimum)?;
+        }
         directory.remove_surfaces(&self.manifest.surfaces, &surface_files(&self.config.output.stl))?;
         if is_refined {
             // Of a mesh before, where the run had ended on it and was resumed.

@@ -207,8 +207,8 @@ impl Reported {
             };
             let mut errors: BTreeMap<_, _> = own.iter().zip(more).map(term).collect();
             // One difference may vanish by chance; all terms come from the same values around the expansion.
-            let mean = (errors.values().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
-            errors.values_mut().for_each(|error| *error = error.max(mean));
+            let rms = (errors.values().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt();
+            errors.values_mut().for_each(|error| *error = error.max(rms));
             (name.clone(), errors)
         };
         let errors = StateErrors {

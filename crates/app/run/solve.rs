@@ -43,14 +43,12 @@ pub fn solve(
         }
     }
     let mesh = prepared.mesh_hash();
-    for change in design.iter().flat_map(|design| design.changes_since_the_run(source.text(), &mesh)) {
+    for change in design.iter().flat_map(|design| design.changes_since_the_run(&mesh)) {
         observer.warning(&change);
     }
-    let problem = &prepared.setup.problem;
     let values = design_values(problem, design.map(|design| design.values), observer);
     // A design that breaks the mesh is refused before an earlier run is replaced.
     let p = values.as_deref().unwrap_or_default();
-    let problem = &prepared.setup.problem;
     let mut moved = problem.moved(p)?;
     // Bounds may be shares of what the initial design has.
     let initial = problem.shape().filter(|_| problem.has_shared_bounds()).map(|shape| shape.initial());

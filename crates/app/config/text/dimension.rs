@@ -46,6 +46,11 @@ macro_rules! dimensions {
                 match self { $(Self::$dimension => $si_unit),+ }
             }
 
+            /// The SI unit as it is shown: empty of a ratio.
+            pub fn shown_unit(self) -> &'static str {
+                if self == Self::Ratio { "" } else { self.si_unit() }
+            }
+
             /// What stands behind a value: a blank and the SI unit, nothing of a ratio.
             pub fn behind_value(self) -> String {
                 if self == Self::Ratio { String::new() } else { format!(" {}", self.si_unit()) }

@@ -15,8 +15,9 @@ mod line;
 
 use fluxmorph_optimizer::driver::Record;
 
+use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{OutputError, RunDirectory, SyncedLog};
+use crate::files::{Manifest, OutputError, RunDirectory, SyncedLog, blake3_hex};
 
 pub(super) use changed_key::changed_key;
 pub use identity::{Identity, configuration_hash, describe_meshes, mesh_hash};
@@ -173,6 +174,20 @@ impl Journal {
         self.sum = sum;
         Ok(())
     }
+}
+
+/// Whether a configuration is, to the letter, the one that a directory was made with, or one that its run may be resumed with.
+pub(crate) fn is_of_run(
+    directory: &RunDirectory,
+    manifest: &Manifest,
+    (config, source): (&Config, &SourceMap),
+) -> Result<bool, Error> {
+    let now = blake3_hex(source.text().as_bytes());
+    if manifest.config.as_ref().is_none_or(|own| own.blake3 == now) {
+        return Ok(true);
+    }
+    let of_run = Journal::read(directory)?.map(|contents| contents.identity.configuration);
+    Ok(of_run.is_some_and(|own| own == configuration_hash(config)))
 }
 
 #[cfg(test)]

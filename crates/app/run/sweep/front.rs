@@ -85,10 +85,9 @@ impl Criterion {
 
     fn of_term(objective: &Objective, k: usize) -> Self {
         let term = &objective.terms()[k];
-        let unit = term.functional.dimension().si_unit();
         Self {
             name: name_of(term),
-            unit: if unit == "1" { "" } else { unit },
+            unit: term.functional.dimension().shown_unit(),
             smaller_is_better: objective.goal.sign() * term.weight > 0.0,
             of: Measured::Term(k, Box::new(term.functional.clone())),
         }
@@ -99,13 +98,13 @@ impl Criterion {
         let is_upper =
             |bound: &ValueBound| matches!(bound, ValueBound::AtMost(_) | ValueBound::AtMostRatio(_));
         let (unit, smaller_is_better) = match &constraint.limit {
-            Limit::Functional { bound, .. } => (constraint.limit.dimension().si_unit(), is_upper(bound)),
+            Limit::Functional { bound, .. } => (constraint.limit.dimension().shown_unit(), is_upper(bound)),
             Limit::Thickness { minimum: Some(_), maximum: Some(_), .. } => return None,
             Limit::Thickness { minimum, .. } => ("m", minimum.is_none()),
         };
         Some(Self {
             name: constraint.name.clone(),
-            unit: if unit == "1" { "" } else { unit },
+            unit,
             smaller_is_better,
             of: Measured::Constraint(
                 constraint.name.clone(),

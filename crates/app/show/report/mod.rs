@@ -53,9 +53,9 @@ use data::RunData;
 
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{Disk, Manifest, OutputError, RunDirectory, blake3_hex};
+use crate::files::{Disk, Manifest, OutputError, RunDirectory};
 use crate::run;
-use crate::run::journal::{Journal, configuration_hash};
+use crate::run::journal;
 
 /// Bytes of a file that tell whether it is a page.
 const HEAD: u64 = 1024;
@@ -95,7 +95,7 @@ impl ReportedRun {
             ));
         }
         let (config, source) = run::configuration(&directory, &manifest)?;
-        if !is_of_run(&directory, &manifest, (&config, &source))? {
+        if !journal::is_of_run(&directory, &manifest, (&config, &source))? {
             return Err(refused(
                 "its config.toml is another than that of the run (manifest.json has its hash): restore it"
                     .into(),
@@ -153,20 +153,6 @@ fn head(path: &Path) -> Result<String, OutputError> {
     let file = std::fs::File::open(path).map_err(OutputError::io("read", path))?;
     file.take(HEAD).read_to_end(&mut head).map_err(OutputError::io("read", path))?;
     Ok(String::from_utf8_lossy(&head).into_owned())
-}
-
-/// Whether a configuration is, to the letter, the one that a directory was made with, or one that its run may be resumed with.
-fn is_of_run(
-    directory: &RunDirectory,
-    manifest: &Manifest,
-    (config, source): (&Config, &SourceMap),
-) -> Result<bool, Error> {
-    let now = blake3_hex(source.text().as_bytes());
-    if manifest.config.as_ref().is_none_or(|own| own.blake3 == now) {
-        return Ok(true);
-    }
-    let of_run = Journal::read(directory)?.map(|contents| contents.identity.configuration);
-    Ok(of_run.is_some_and(|own| own == configuration_hash(config)))
 }
 
 /// The relative path from the folder of a file to a directory, with a slash at its end; nothing where they are the same.

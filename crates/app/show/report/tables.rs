@@ -8,7 +8,7 @@ use super::markup::{note, table};
 use super::ticks::{decimals_of, given, number, trim_zeros};
 use super::{harmonics, iron};
 use crate::build::{Audited, Outline, PermeabilityOf, skin_warnings};
-use crate::config::{Constraint, Dimension, Limit, Objective, ObjectiveKind, RegionModel, Term};
+use crate::config::{Constraint, Limit, Objective, ObjectiveKind, RegionModel, Term};
 use crate::files::{ConstraintResult, ProbeResult, RunResult, SAFETY, StateResult, TermResult};
 use crate::show::Evaluation;
 use crate::show::states::State;
@@ -182,8 +182,7 @@ fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64
     match constraints.iter().find(|own| own.is_called(name)).map(|own| &own.limit) {
         Some(Limit::Functional { functional, .. }) => match functional.kind {
             ObjectiveKind::Volume => ("cm³", 1e6),
-            _ if functional.dimension() == Dimension::Ratio => ("", 1.0),
-            _ => (functional.dimension().si_unit(), 1.0),
+            _ => (functional.dimension().shown_unit(), 1.0),
         },
         Some(Limit::Thickness { .. }) => ("mm", 1e3),
         None => ("in SI", 1.0),
