@@ -202,3 +202,117 @@ fn the_homogeneity_of_a_component_that_images_change_is_asked_about() {
     };
     assert!(said("[1, 0, 1]") && said("[1, 0, 0]") && !said("[0, 0, 1]"));
 }
+
+/// A ring of 30 mm radius over the plane z = 0 of a box, off the middle, with a region and a ball at the plane.
+const OVER_A_PLANE: &str = r#"
+[mesh]
+generator = "boxes"
+[mesh.boxes]
+box = [[-0.1, -0.1, 0], [0.1, 0.1, 0.1]]
+growth = 1.8
+[[mesh.boxes.regions]]
+name = "seen"
+box = [[-0.02, -0.02, 0], [0.02, 0.02, 0.02]]
+size = 0.01
+[[mesh.boxes.surfaces]]
+name = "plane"
+box = [[-0.1, -0.1, 0], [0.1, 0.08, 0]]
+[[mesh.boxes.surfaces]]
+name = "strip"
+box = [[-0.1, 0.08, 0], [0.1, 0.1, 0]]
+[[mesh.boxes.sizes]]
+axis = "y"
+from = 0.08
+to = 0.1
+
+[analysis]
+frequency = 0
+
+[[coils]]
+name = "ring"
+shape = "circular"
+ampere_turns = 1e4
+center = [0.03, 0, 0.03]
+radius = 0.03
+width = 0.01
+height = 0.01
+
+[boundaries]
+flux_parallel = ["x_min", "x_max", "y_min", "y_max", "z_max"]
+flux_normal = ["plane", "strip"]
+
+[[multipoles]]
+name = "ball"
+shape = "ball"
+radius = 0.012
+order = 2
+
+[objective]
+kind = "homogeneity"
+region = "seen"
+compare = "vector"
+
+[accuracy]
+estimate = false
+
+[output]
+fields = "none"
+"#;
+
+/// What holds in a plane far from a ball is nothing to its images, and what a face is called nothing to the mean of the device.
+#[test]
+fn planes_are_judged_by_their_faces_and_not_by_their_names() {
+    let home = folder();
+    let config = home.path().join("plane.toml");
+    std::fs::write(&config, OVER_A_PLANE).expect("written");
+    let of = |normal: &str, parallel: &str| {
+        let conditions = [
+            format!("boundaries.flux_normal=[{normal}]"),
+            format!(
+                "boundaries.flux_parallel=[\"x_min\", \"x_max\", \"y_min\", \"y_max\", \"z_max\"{parallel}]"
+            ),
+        ];
+        let out = home.path().join("out");
+        let overrides = set(&conditions.each_ref().map(String::as_str));
+        finish(command(&[&"solve", &config, &"--out", &out, &"--force"]).args(overrides)).exits_with(0);
+        let result = read_json(&out.join("result.json"));
+        [number(&result, "/multipoles/0/terms/0/value_t"), number(&result, "/objective/best")]
+    };
+    let [field, spread] = of("\"plane\", \"strip\"", "");
+    // The same condition, not written.
+    assert_eq!(of("\"plane\"", ""), [field, spread]);
+    let [beside, _] = of("\"plane\"", ", \"strip\"");
+    println!("{field:.5e} T, with a sheet far away {beside:.5e} T; {spread:.5e}");
+    assert!((beside / field - 1.0).abs() < 0.02, "{beside} {field}");
+    let divided = set(&[
+        "boundaries.flux_normal=[\"plane\"]",
+        "boundaries.flux_parallel=[\"z_max\", \"strip\"]",
+        "multipoles=[{name = \"ball\", shape = \"ball\", radius = 0.09, order = 2}]",
+    ]);
+    let refused = finish(command(&[&"check", &config]).args(divided)).exits_with(3);
+    let text = &refused.stderr;
+    assert!(
+        text.contains("a plane across z that is flux-parallel and flux-normal within its radius"),
+        "{text}"
+    );
+}
+
+/// The octant of a quadrupole: what its images leave of the mean is nothing.
+#[test]
+fn a_device_without_a_mean_is_named() {
+    let home = folder();
+    let config = home.path().join("octant.toml");
+    let planes = [
+        ("flux_normal = [\"plane\", \"strip\"]", "flux_normal = [\"x_min\", \"y_min\"]"),
+        ("[\"x_min\", \"x_max\", \"y_min\", \"y_max\", \"z_max\"]", "[\"plane\", \"strip\", \"x_max\"]"),
+        ("[-0.02, -0.02, 0]", "[-0.1, -0.1, 0]"),
+        ("[[multipoles]]\nname = \"ball\"\nshape = \"ball\"\nradius = 0.012\norder = 2\n", ""),
+    ];
+    std::fs::write(&config, changed(OVER_A_PLANE, &planes)).expect("written");
+    let said = |compare: &str| {
+        let compare = set(&[compare]);
+        let json = finish(command(&[&"check", &config, &"--json"]).args(compare)).exits_with(0).json();
+        texts(&json["warnings"]).contains("leave the mean of B over the whole device no direction")
+    };
+    assert!(said("objective.compare=\"vector\"") && !said("objective.compare=\"modulus\""));
+}

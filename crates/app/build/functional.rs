@@ -229,6 +229,30 @@ fn regions_of(body: &config::ForceBody, mesh: &Mesh) -> Result<Vec<RegionId>, Me
     body.regions.iter().map(|name| mesh.topology().region(name)).collect()
 }
 
+/// Vectors compared with their mean where planes of symmetry leave the whole device none.
+pub(super) fn mean_warnings(
+    config: &Config,
+    meshes: [&Mesh; 2],
+    states: &[FieldModel],
+) -> Result<Vec<String>, Error> {
+    let mut warnings = Vec::new();
+    for (_, own) in functionals(config).into_iter().filter(|(_, own)| own.kind == ObjectiveKind::Homogeneity)
+    {
+        let term = term(config, own, meshes, states)?;
+        if let Functional::Observation(observation) = &term.functional
+            && observation.has_no_mean(&states[0])
+        {
+            warnings.push(format!(
+                "the planes of symmetry at which `{}` ends leave the mean of B over the whole device no direction: its homogeneity is \
+                 relative to the mean over the part that is meshed, which the device does not have. Take compare = \"modulus\", or a \
+                 component",
+                own.region.as_deref().unwrap_or_default()
+            ));
+        }
+    }
+    Ok(warnings)
+}
+
 /// Elements that must not move, for they are observed.
 pub(super) struct FixedElements {
     pub(super) elements: Vec<ElementId>,

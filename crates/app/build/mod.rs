@@ -53,7 +53,7 @@ pub(crate) use refined::RefinedMesh;
 pub use skin::{Audited, PermeabilityOf};
 pub(crate) use skin::{audit_in_field, least_thickness, result_warnings, warnings as skin_warnings};
 pub(crate) use soundness::overlap_warning;
-pub(crate) use truncation::Truncation;
+pub(crate) use truncation::{Truncation, observed_regions};
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -230,6 +230,7 @@ fn problem_on(
         warnings.push(unexcited(config, source, mode)?);
     }
     let objective = functional::objective(config, [&full_mesh, &mesh], &states)?;
+    warnings.extend(functional::mean_warnings(config, [&full_mesh, &mesh], &states)?);
     let shape = match (&design, body) {
         (Some(inputs), Some(body)) => {
             progress.stage(Stage::Elasticity);

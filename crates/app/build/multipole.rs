@@ -1,6 +1,7 @@
 //! Expansions of a configuration on its mesh and states.
 
 use fluxmorph_geometry::box_tree::AxisBox;
+use fluxmorph_geometry::tet4::{centroid, norm, sub};
 use fluxmorph_geometry::{Mesh, millimetres};
 use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::coil::Frame;
@@ -107,6 +108,17 @@ pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) 
     let (mesh, states) = (problem.original(), problem.states());
     let mut sink = DiagnosticSink::new(config, source, Vec::new());
     for (k, set) in config.multipoles.iter().enumerate() {
+        if let Some(axis) = divided_plane(config, set, mesh)? {
+            let message = format!(
+                "the expansion `{}` ends at a plane across {axis} that is flux-parallel and flux-normal within its radius",
+                set.name
+            );
+            let fault = source.diagnostic(&format!("multipoles[{k}].radius"), message);
+            sink.push(
+                fault.expected("one condition in a plane through its centre, beyond which it has an image"),
+            );
+            continue;
+        }
         let Some((message, what)) = disturbance(config, set, problem, mesh)? else {
             sink.take(multipoles(config, set, mesh, &states[0]))?;
             continue;
@@ -191,24 +203,50 @@ pub(super) fn functional(
     Ok(Functional::multipole(multipoles(config, set, mesh, model)?, of)?)
 }
 
-/// The symmetry planes through the centre of an expansion.
+/// The symmetry planes through the centre of an expansion, by the faces that lie in it: what holds elsewhere in such a plane is no matter of
+/// the images of a circle or ball.
 fn planes(config: &Config, set: &MultipoleSet, mesh: &Mesh) -> Result<Vec<MirrorPlane>, Error> {
     let boundaries = &config.boundaries;
     let parallel = boundaries.flux_parallel.iter().map(|name| (name, -1.0));
     let normal = boundaries.flux_normal.iter().map(|name| (name, 1.0));
-    let mut planes: Vec<MirrorPlane> = Vec::new();
+    let tolerance = OFF_CENTRE * set.radius;
+    // By axis, the distance of the nearest face [m].
+    let mut nearest: [Option<(f64, MirrorPlane)>; 3] = [None; 3];
     for (surface, across) in parallel.chain(normal) {
-        let triangles = mesh.topology().surface(surface)?;
-        let points = || triangles.iter().flatten().map(|&node| mesh.point(node));
-        let goes_through = |axis: usize| {
-            let tolerance = OFF_CENTRE * set.radius;
-            points().all(|x| (x[axis] - set.center[axis]).abs() <= tolerance) && !triangles.is_empty()
-        };
-        for axis in (0..3).filter(|&axis| goes_through(axis)) {
-            if planes.iter().all(|plane| plane.axis != axis) {
-                planes.push(MirrorPlane { axis, at: set.center[axis], across });
+        for triangle in mesh.topology().surface(surface)? {
+            let corners = triangle.map(|node| mesh.point(node));
+            let distance = norm(sub(centroid(corners), set.center));
+            for axis in 0..3 {
+                let is_through = corners.iter().all(|x| (x[axis] - set.center[axis]).abs() <= tolerance);
+                if is_through && nearest[axis].is_none_or(|(least, _)| distance < least) {
+                    nearest[axis] = Some((distance, MirrorPlane { axis, at: set.center[axis], across }));
+                }
             }
         }
     }
-    Ok(planes)
+    Ok(nearest.into_iter().flatten().map(|(_, plane)| plane).collect())
+}
+
+/// A plane through the centre of an expansion of which faces within its radius have both conditions: no image goes on behind it.
+fn divided_plane(config: &Config, set: &MultipoleSet, mesh: &Mesh) -> Result<Option<&'static str>, Error> {
+    let planes = planes(config, set, mesh)?;
+    let boundaries = &config.boundaries;
+    for (names, across) in [(&boundaries.flux_parallel, -1.0), (&boundaries.flux_normal, 1.0)] {
+        for surface in names {
+            for triangle in mesh.topology().surface(surface)? {
+                let corners = triangle.map(|node| mesh.point(node));
+                let reaches = corners.iter().any(|x| norm(sub(*x, set.center)) < set.radius);
+                let lies_in = |plane: &&MirrorPlane| {
+                    let off = OFF_CENTRE * set.radius;
+                    corners.iter().all(|x| (x[plane.axis] - plane.at).abs() <= off)
+                };
+                if let Some(plane) =
+                    planes.iter().find(lies_in).filter(|plane| reaches && plane.across != across)
+                {
+                    return Ok(Some(["x", "y", "z"][plane.axis]));
+                }
+            }
+        }
+    }
+    Ok(None)
 }

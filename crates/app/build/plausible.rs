@@ -9,7 +9,7 @@ use std::ops::RangeInclusive;
 use fluxmorph_geometry::soundness::OpenPatch;
 use fluxmorph_geometry::tet4::{Point, dot, norm};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
 use super::entries::material;
@@ -129,7 +129,7 @@ pub(super) fn warnings(
 ) -> Vec<String> {
     let mut warnings: Vec<String> = Vec::new();
     warnings.extend(wave_warning(config, mesh));
-    warnings.extend(overlap_warnings(config, coils));
+    warnings.extend(overlap_warnings(config, mesh, coils));
     warnings.extend((0..config.coils.len()).filter_map(|i| twin_warning(config, i)));
     if config.boundaries.is_empty() && !open_patches.is_empty() {
         warnings.push(
@@ -204,8 +204,10 @@ fn wave_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     let (length, size) = (SPEED_OF_LIGHT / frequency, size(mesh));
     (size > LARGEST_PART_OF_A_WAVE * length).then(|| {
         format!(
-            "at {frequency:e} Hz a wave in air is {length:.3} m long, and the mesh is {size:.3} m from corner to corner: \
-             displacement currents, which are left out, are no longer small there"
+            "at {frequency:e} Hz a wave in air is {:.3} mm long, and the mesh is {:.3} mm from corner to corner: \
+             displacement currents, which are left out, are no longer small there",
+            Millimetres(length),
+            Millimetres(size)
         )
     })
 }
@@ -244,9 +246,27 @@ fn common_region<'a>(first: &Coil, second: &'a Coil) -> Option<&'a str> {
     }
 }
 
-/// What to say of analytic windings that take the same place.
-fn overlap_warnings(config: &Config, coils: &[coil::Coil]) -> Vec<String> {
+/// What to say of windings that take the same place, one of them analytic.
+fn overlap_warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
     let all: Vec<(usize, &Racetrack)> = windings(coils).collect();
+    let text = |[first, second]: [usize; 2], place: Point| {
+        format!(
+            "the windings of the coils `{}` and `{}` overlap, at {}: two wires cannot be in one place",
+            config.coils[first].name,
+            config.coils[second].name,
+            millimetres(place)
+        )
+    };
+    let in_region = |(i, winding): &(usize, &Racetrack)| {
+        let of_regions = config.coils.iter().enumerate().filter_map(|(j, coil)| match &coil.shape {
+            CoilShape::Region(own) => Some((j, mesh.topology().region(&own.region).ok()?)),
+            _ => None,
+        });
+        let place =
+            |region| place_of_current(mesh, winding, |e| mesh.topology().region_of()[e.index()] == region);
+        let met = of_regions.filter_map(|(j, region)| Some(text([*i, j], place(region)?.1)));
+        met.collect::<Vec<String>>()
+    };
     let pairs =
         all.iter().enumerate().flat_map(|(k, first)| all[k + 1..].iter().map(move |second| (first, second)));
     let warning = |((i, first), (j, second)): (&(usize, &Racetrack), &(usize, &Racetrack))| {
@@ -254,14 +274,9 @@ fn overlap_warnings(config: &Config, coils: &[coil::Coil]) -> Vec<String> {
         // The same winding twice is said elsewhere.
         let is_other = first_coil.shape != second_coil.shape;
         let place = common_place(first, second).filter(|_| is_other)?;
-        Some(format!(
-            "the windings of the coils `{}` and `{}` overlap, at {}: two wires cannot be in one place",
-            first_coil.name,
-            second_coil.name,
-            millimetres(place)
-        ))
+        Some(text([*i, *j], place))
     };
-    pairs.filter_map(warning).collect()
+    pairs.filter_map(warning).chain(all.iter().flat_map(in_region)).collect()
 }
 
 /// A place at which the current of both windings flows, of a grid over what their boxes have in common.

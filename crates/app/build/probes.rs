@@ -7,7 +7,7 @@ use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::curved::SMOOTH;
 use fluxmorph_geometry::locate::{holders, locate};
 use fluxmorph_geometry::tet4::{Point, dot, volume};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, millimetres};
 
 use super::entries::material;
 use super::motion::distance_to_line;
@@ -150,8 +150,8 @@ impl<'a> Edges<'a> {
             millimetres(point),
             and_more(all.len(), " less so"),
             probe.name,
-            1e3 * share * size,
-            1e3 * size * self.order
+            Millimetres(share * size),
+            Millimetres(size * self.order)
         ))
     }
 }

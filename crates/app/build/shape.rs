@@ -384,7 +384,12 @@ fn overlap_faults(
         let at = millimetres(centroid(mesh.vertices(e)));
         let message = format!("the shell of open space reaches into the remesh region, at {at}");
         let fault = source.diagnostic("open", message);
-        faults.push(fault.expected("a remesh region inside the shell, which does not move"));
+        let fault = fault.expected("a remesh region inside the shell, which does not move");
+        let region = mesh.topology().region_name_at(e);
+        faults.push(match brought_in(inputs, region) {
+            Some(cure) => fault.help(cure),
+            None => fault,
+        });
     }
     faults
 }
@@ -407,11 +412,27 @@ fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Dia
     let fault = fault.expected(
         "a remesh region without nodes of elements that a winding or an end of its window cuts: a coil does not move with the mesh",
     );
-    let cure = "shrink the remesh region, or make what is in the coil's window a region of its own that stays; of a coil that is a \
-                region of the mesh only that has to stay";
+    let cure = match brought_in(inputs, region) {
+        Some(cure) => cure,
+        None => "shrink the remesh region, or make what is in the coil's window a region of its own that stays; of a coil that is a \
+                 region of the mesh only that has to stay"
+            .to_owned(),
+    };
     fault.help(match plausible::unit_hint(config, inputs.full_mesh) {
         Some(hint) => format!("{hint}; else {cure}"),
-        None => cure.to_owned(),
+        None => cure,
+    })
+}
+
+/// That a region is part of the elastic body by the design surface alone, which no key of `[remesh]` says.
+fn brought_in(inputs: &Inputs<'_>, region: &str) -> Option<String> {
+    let config::RemeshExtent::Regions(named) = &inputs.remesh.extent else { return None };
+    (!named.iter().any(|own| own == region)).then(|| {
+        format!(
+            "`{region}` moves because it touches the design surface `{}`, not by remesh.region: take another surface, or lay a region \
+             between it and what stays",
+            inputs.design.surface.join("`, `")
+        )
     })
 }
 

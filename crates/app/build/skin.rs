@@ -41,7 +41,6 @@ impl Audited {
     /// The warning for the user, if there is one.
     pub fn warning(&self) -> Option<String> {
         let (coarse, thin) = (self.audit.volume_warning(), self.audit.impedance_warning());
-        let depths = self.audit.thickness_in_skin_depths;
         let permeability = self.audit.relative_permeability;
         match (self.model, self.permeability_of) {
             (RegionModel::Volume, PermeabilityOf::LargestOfCurve) => coarse.map(|text| {
@@ -61,8 +60,9 @@ impl Audited {
             // Neither model must send to the other where that one has an objection too.
             (RegionModel::Volume, PermeabilityOf::Material) if thin.is_some() => coarse.map(|text| {
                 format!(
-                    "{}. Refine the skin: at {depths:.1} skin depths on average the region is too thin for an impedance surface",
-                    finding(&text)
+                    "{}. Refine the skin: the region is too thin for an impedance surface, {}",
+                    finding(&text),
+                    self.audit.thinness().unwrap_or_default()
                 )
             }),
             (RegionModel::Volume, PermeabilityOf::Material) => coarse,

@@ -6,13 +6,13 @@
 
 mod site;
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::soundness::{Hull, OpenPatch, open_patches};
 use fluxmorph_geometry::tet4::{Point, add, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, millimetres};
+use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, millimetres};
 use fluxmorph_solver::coil::CoilShape;
 use fluxmorph_solver::{Boundary, FieldModel, Material};
 use serde::Serialize;
@@ -346,16 +346,21 @@ fn is_plane_device(sides: &[Side]) -> bool {
     reached().any(|side| reached().any(|other| side.is_opposite(other)))
 }
 
-/// The places at which B is observed: regions, expansions, and the points of probes. What fills the mesh, of which `whole` is the
-/// box, is no place.
-fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Site> {
-    let topology = mesh.topology();
+/// The regions at whose places B is observed, each once.
+pub(crate) fn observed_regions(config: &Config, mesh: &Mesh) -> BTreeSet<RegionId> {
     let is_of_places = |kind: ObjectiveKind| {
         use ObjectiveKind::{FieldComponent, FluxDensitySquared, Homogeneity, TargetField};
         matches!(kind, FluxDensitySquared | TargetField | FieldComponent | Homogeneity)
     };
     let own = functionals(config).into_iter().filter(|(_, own)| is_of_places(own.kind));
-    let regions = own.filter_map(|(_, own)| topology.region(own.region.as_ref()?).ok());
+    own.filter_map(|(_, own)| mesh.topology().region(own.region.as_ref()?).ok()).collect()
+}
+
+/// The places at which B is observed: regions, expansions, and the points of probes. What fills the mesh, of which `whole` is the
+/// box, is no place.
+fn observed(config: &Config, mesh: &Mesh, whole: &AxisBox) -> Vec<Site> {
+    let topology = mesh.topology();
+    let regions = observed_regions(config, mesh).into_iter();
     let of_regions = regions.map(|region| Site::of_nodes(mesh, nodes_of(mesh, topology.elements_of(region))));
     let of_probes = config.probes.iter().map(|probe| Site::new(Form::Probe(probe.points.clone())));
     let of_expansions =

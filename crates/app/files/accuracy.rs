@@ -12,6 +12,9 @@ const LEAST_SHARE: f64 = 0.5;
 /// harmonics of a magnet at first may be right in that nine tenths of them can go.
 const LEAST_SHARE_IN_UNIT: f64 = 0.25;
 
+/// Share of the best value from which on the initial one is a measure of it.
+const LEAST_START: f64 = 0.1;
+
 /// Least gain, relative to the objective, of which anything can be said: a hundred times what the fields of checks are solved to.
 const LEAST_GAIN: f64 = 1e-5;
 
@@ -184,15 +187,20 @@ impl Accuracy {
 
     /// Judges a gain by what other computations have for the objective of the initial and of the best shape; nothing is said of hardly
     /// any gain, or by none. Half of the gain must be left as a ratio, and a quarter of it in the unit of the objective: where a mesh
-    /// has most of both values wrong, the ratio of what is left may be anything.
+    /// has most of both values wrong, the ratio of what is left may be anything. Of a value that begins near zero, or passes through
+    /// it, there is no ratio: half of the gain must then be left in the unit of the objective.
     pub fn judge(&mut self, [initial, best]: [f64; 2], others: &[[f64; 2]]) {
         let gain = best / initial - 1.0;
         if gain.abs() < LEAST_GAIN || others.is_empty() {
             return;
         }
+        let has_ratio = best / initial > 0.0 && initial.abs() >= LEAST_START * best.abs();
         let is_left = others.iter().all(|[first, last]| {
             let (as_ratio, in_unit) = ((last / first - 1.0) / gain, (last - first) / (best - initial));
-            as_ratio >= LEAST_SHARE && in_unit >= LEAST_SHARE_IN_UNIT
+            match has_ratio {
+                true => as_ratio >= LEAST_SHARE && in_unit >= LEAST_SHARE_IN_UNIT,
+                false => in_unit >= LEAST_SHARE,
+            }
         });
         self.verdict = Some(if is_left { Verdict::Confirmed } else { Verdict::NotConfirmed });
     }
@@ -237,6 +245,15 @@ mod tests {
         // The content of a quadrupole on a coarse mesh, which has twice too much of it at first.
         let own = [4.369e-5, 2.807e-6];
         assert_eq!(verdict_of(own, &[[2.586e-5, 1.947e-6], [2.154e-5, 2.186e-6]]), Some(Verdict::Confirmed));
+    }
+
+    /// Forces that pass through zero or begin there, on a fresh mesh and in second order.
+    #[test]
+    fn a_value_that_begins_near_zero_has_no_ratio() {
+        let own = [0.3308, -0.1923];
+        assert_eq!(verdict_of(own, &[[0.7214, 0.2647], [0.70, 0.249]]), Some(Verdict::Confirmed));
+        assert_eq!(verdict_of(own, &[[0.7214, 0.5214]]), Some(Verdict::NotConfirmed));
+        assert_eq!(verdict_of([5.7e-8, 1.7306], &[[0.3465, 1.9867]]), Some(Verdict::Confirmed));
     }
 
     #[test]

@@ -43,7 +43,7 @@ pub use names::{extend_command, resume_command, surface_files};
 pub use refinements::{RefinementStep, Refinements};
 pub use result::{
     ConstraintResult, DesignResult, HomogeneityResult, LinearSolverResult, MeshResult, ObjectiveResult,
-    OpenResult, RunResult, TermResult, Verification, VerificationMesh,
+    OpenResult, RunResult, ShapeDeviation, TermResult, Verification, VerificationMesh,
 };
 pub(crate) use run_directory::{LOCK, check_place};
 pub use run_directory::{OverwritePolicy, RunDirectory};

@@ -178,6 +178,9 @@ pub struct Verification {
     pub refinement: f64,
     /// Its tetrahedra.
     pub tets: usize,
+    /// How far the best shape is there from that of the run; `None` where nodes are the variables, and on cut elements.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<ShapeDeviation>,
     /// The objective at the initial design there.
     pub initial: f64,
     /// The objective at the best design there.
@@ -187,6 +190,16 @@ pub struct Verification {
     /// The constraints at the best design there, with their bounds there.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub constraints: Vec<ConstraintResult>,
+}
+
+/// How far the surface that a control grid moves is from the same on another mesh: a grid that is finer than the cells, or bends
+/// within them, has another shape on other cells.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ShapeDeviation {
+    /// The farthest that a node of the fresh mesh is from the surface of the run's [m].
+    pub distance_m: f64,
+    /// The farthest that one has moved [m].
+    pub motion_m: f64,
 }
 
 impl Verification {
@@ -345,6 +358,7 @@ pub(crate) mod tests {
                     mesh: VerificationMesh::Fresh,
                     refinement: 2.0,
                     tets: 147_000,
+                    deviation: None,
                     initial: 2.2,
                     best: 1.1,
                     ratio: 0.5,

@@ -21,17 +21,21 @@ use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, S
 
 use super::confirmation::ShapeMeshes;
 use super::finer::{Cut, FinerMesh, FinerProblem, both, looked_at_once};
-use super::shape_pair::ShapePair;
+use super::shape_pair::{ShapePair, ShapesOnMesh};
 use super::summary;
 use crate::build::{DividedMesh, Mode, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{ObjectiveResult, Verification, VerificationMesh};
-use crate::show::Observer;
+use crate::files::{ObjectiveResult, ShapeDeviation, Verification, VerificationMesh};
+use crate::show::{self, Observer};
 
 /// Counted work of a shape on a fresh mesh, in evaluations, beyond which elements are cut instead. The shipped runs have 4 to 21, and
 /// second-order edge elements of `shield_edge.toml`, which would take twenty minutes after a search of three, 29.
 const MOST_EVALUATIONS: f64 = 25.0;
+
+/// Share of its motion that the surface of a control grid may be from that of the run, and share of the gain that the two ratios
+/// may be apart: beyond both, the difference may be one of shapes.
+const LARGEST_DEVIATION: [f64; 2] = [0.1, 0.1];
 
 /// Whether a check was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -148,6 +152,9 @@ impl MeshIndependence<'_> {
                         excess(constraint.value - bound, bound)
                     ));
                 }
+                if let Some(notice) = of_another_shape(&verification, objective.ratio) {
+                    observer.notice(&notice);
+                }
                 objective.verified_ratio = Some(verification.ratio);
                 objective.verification = Some(verification);
             }
@@ -228,14 +235,16 @@ impl MeshIndependence<'_> {
         if interrupted() {
             return Ok(Outcome::CutShort);
         }
-        let displacements = self.shapes.displacements(&config, &setup)?;
+        let ShapesOnMesh { displacements, deviation } = self.shapes.on(&config, &setup)?;
         let problem = setup.problem;
         let analyse =
             |displacement: &Vec<Point>, cache: &mut SolverCache| analysis_at(&problem, cache, displacement);
         let Some(analyses) = both(displacements.each_ref(), interrupted, analyse)? else {
             return Ok(Outcome::CutShort);
         };
-        Ok(Outcome::Found(verification(&problem, (VerificationMesh::Fresh, fresh.parts as f64), &analyses)?))
+        let mesh = (VerificationMesh::Fresh, fresh.parts as f64);
+        let found = verification(&problem, mesh, &analyses)?;
+        Ok(Outcome::Found(Verification { deviation, ..found }))
     }
 }
 
@@ -256,10 +265,28 @@ fn verification(
         mesh,
         refinement,
         tets: problem.original().topology().tets().len(),
+        deviation: None,
         initial: of_initial,
         best: of_best,
         ratio,
         constraints: summary::constraints(problem, best, &bounds),
+    })
+}
+
+/// That the best shape on a fresh mesh is so far from that of the run that their ratios, which differ, may be those of two shapes.
+fn of_another_shape(found: &Verification, ratio: f64) -> Option<String> {
+    let ShapeDeviation { distance_m, motion_m } = found.deviation?;
+    let [of_motion, of_gain] = LARGEST_DEVIATION;
+    let is_another =
+        distance_m > of_motion * motion_m && (found.ratio - ratio).abs() > of_gain * (ratio - 1.0).abs();
+    is_another.then(|| {
+        format!(
+            "F/F0 on the fresh mesh, {}, is that of another shape: up to {:.3} mm from that of the run, of {:.3} mm of motion, as the \
+             control grid is finer than the cells of the surface, or bends within them; a coarser grid or smaller cells have one shape",
+            show::ratio(found.ratio),
+            1e3 * distance_m,
+            1e3 * motion_m
+        )
     })
 }
 

@@ -27,6 +27,7 @@ pub mod shape_pair;
 mod solve;
 mod summary;
 pub mod sweep;
+mod transmission;
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

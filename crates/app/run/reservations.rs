@@ -13,8 +13,8 @@ use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
 
-use super::excess;
 use super::reported::under;
+use super::{excess, transmission};
 use crate::build::{
     Audited, PermeabilityOf, Setup, audit_in_field, least_thickness, material, multipole, overlap_warning,
     result_warnings, skin_warnings,
@@ -62,6 +62,7 @@ pub(super) fn reservations(
     let mut all = saturation(config, problem, analysis);
     all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
     all.extend(excess::of_conductors(problem, analysis));
+    all.extend(transmission::warnings(config, problem, analysis));
     let least = problem
         .shape()
         .map(|shape| least_thickness(shape, &setup.full_mesh, |node| analysis.mesh.point(node)));

@@ -1,27 +1,32 @@
 //! Initial and best shape of a run, for another mesh of the same device.
 
-use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::design::Triangulation;
 
 use crate::build::{Setup, design_triangulation};
 use crate::config::Config;
 use crate::error::Error;
+use crate::files::ShapeDeviation;
 
 /// Initial and best shape of a run, in a form that another mesh can take.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ShapePair {
     /// The initial shape is the best.
     Unchanged,
-    /// Variables of a control grid [m].
-    Variables([Vec<f64>; 2]),
-    /// Displacements of a surface's nodes [m], each of shape `(n_nodes, 3)`.
-    Displacements {
-        /// The undeformed surface.
-        surface: Box<Triangulation>,
-        /// One displacement per node.
-        pair: [Vec<Point>; 2],
-    },
+    /// It is not.
+    Changed(Box<Change>),
+}
+
+/// Two shapes of a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Change {
+    /// Variables of a control grid [m], where the design has one.
+    variables: Option<[Vec<f64>; 2]>,
+    /// The undeformed surface.
+    surface: Triangulation,
+    /// Displacements of its nodes [m], each of shape `(n_nodes, 3)`.
+    displacements: [Vec<Point>; 2],
 }
 
 impl ShapePair {
@@ -39,27 +44,50 @@ impl ShapePair {
         if best == shape.initial() {
             return Ok(Self::Unchanged);
         }
-        if design.grid.is_some() {
-            return Ok(Self::Variables([shape.initial().to_vec(), best.to_vec()]));
-        }
-        let surface = Box::new(design_triangulation(design, &setup.full_mesh)?);
-        Ok(Self::Displacements { surface, pair: [shape.initial(), best].map(|p| shape.displacement(p)) })
+        let pair = [shape.initial(), best];
+        Ok(Self::Changed(Box::new(Change {
+            variables: design.grid.is_some().then(|| pair.map(<[f64]>::to_vec)),
+            surface: design_triangulation(design, &setup.full_mesh)?,
+            displacements: pair.map(|p| shape.displacement(p)),
+        })))
     }
 
-    /// Displacements of the design nodes of another mesh of the same configuration [m], each of shape `(n_design, 3)`.
-    pub(super) fn displacements(&self, config: &Config, setup: &Setup) -> Result<[Vec<Point>; 2], Error> {
+    /// Both shapes on another mesh of the same configuration.
+    pub(super) fn on(&self, config: &Config, setup: &Setup) -> Result<ShapesOnMesh, Error> {
         let (Some(design), Some(shape)) = (&config.design, setup.problem.shape()) else {
-            return Ok(Default::default());
+            return Ok(ShapesOnMesh::default());
         };
-        match self {
-            Self::Unchanged => Ok([shape.initial(), shape.initial()].map(|p| shape.displacement(p))),
-            Self::Variables(pair) => Ok(pair.each_ref().map(|p| shape.displacement(p))),
-            Self::Displacements { surface, pair: [initial, best] } => {
-                let fresh = design_triangulation(design, &setup.full_mesh)?;
-                let transferred = [initial, best].map(|values| surface.transfer(values, &fresh));
-                let [initial, best] = transferred.map(|values| values.map_err(OptimizerError::from));
-                Ok([initial?, best?])
-            }
-        }
+        let Self::Changed(change) = self else {
+            let displacements = [shape.initial(), shape.initial()].map(|p| shape.displacement(p));
+            return Ok(ShapesOnMesh { displacements, ..ShapesOnMesh::default() });
+        };
+        let fresh = design_triangulation(design, &setup.full_mesh)?;
+        let [initial, best] = change.displacements.each_ref().map(|d| change.surface.transfer(d, &fresh));
+        let Some(variables) = &change.variables else {
+            let displacements = [initial.map_err(OptimizerError::from)?, best.map_err(OptimizerError::from)?];
+            return Ok(ShapesOnMesh { displacements, ..ShapesOnMesh::default() });
+        };
+        let displacements = variables.each_ref().map(|p| shape.displacement(p));
+        // A surface that is found on no piece of the old one is brought to its shape by the grid all the same.
+        let deviation = best.ok().map(|best| deviation(&best, &displacements[1]));
+        Ok(ShapesOnMesh { displacements, deviation })
+    }
+}
+
+/// Both shapes of a run on another mesh.
+#[derive(Default)]
+pub(super) struct ShapesOnMesh {
+    /// Displacements of its design nodes [m], each of shape `(n_design, 3)`.
+    pub(super) displacements: [Vec<Point>; 2],
+    /// How far the best shape of a control grid is from that on the run's mesh.
+    pub(super) deviation: Option<ShapeDeviation>,
+}
+
+/// How far displacements of nodes are from those of a surface that the same control grid moves.
+fn deviation(old: &[Point], fresh: &[Point]) -> ShapeDeviation {
+    let longest = |vectors: &mut dyn Iterator<Item = Point>| vectors.map(norm).fold(0.0, f64::max);
+    ShapeDeviation {
+        distance_m: longest(&mut old.iter().zip(fresh).map(|(&a, &b)| sub(a, b))),
+        motion_m: longest(&mut fresh.iter().copied()),
     }
 }

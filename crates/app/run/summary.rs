@@ -344,11 +344,14 @@ pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) 
     });
     let worse = |a: &f64, b: &f64| objective.combination == Combination::WorstCase && b > a;
     let (_, quality, model) = qualities.reduce(|a, b| if worse(&a.0, &b.0) { b } else { a })?;
-    let is_alone = matches!(terms.as_slice(), [term] if term.weight == 1.0 && term.states.len() == 1);
+    let weight = match terms.as_slice() {
+        [term] if term.states.len() == 1 => Some(objective.goal.sign() * term.weight),
+        _ => None,
+    };
     Some(HomogeneityResult {
         mean_b_t: quality.mean,
         rms_ppm: 1e6 * quality.rms,
-        initial_rms_ppm: is_alone.then(|| 1e6 * initial.sqrt()),
+        initial_rms_ppm: weight.map(|weight| 1e6 * (initial / weight).sqrt()),
         peak_to_peak_ppm: 1e6 * quality.peak_to_peak,
         state: (problem.states().len() > 1).then(|| model.label()),
     })

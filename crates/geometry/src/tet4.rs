@@ -95,6 +95,15 @@ pub fn point_at(vertices: &[Point; 4], lambda: &[f64; 4]) -> Point {
     std::array::from_fn(|d| (0..4).map(|a| lambda[a] * vertices[a][d]).sum())
 }
 
+/// Barycentric coordinates of a point in the plane of a triangle, by sub-areas.
+pub fn barycentric(triangle: &[Point; 3], point: Point) -> Point {
+    let normal = area_vector(*triangle);
+    std::array::from_fn(|k| {
+        let edge = sub(triangle[(k + 2) % 3], triangle[(k + 1) % 3]);
+        0.5 * dot(cross(edge, sub(point, triangle[(k + 1) % 3])), normal) / dot(normal, normal)
+    })
+}
+
 /// Centroid of a set of vertices [m].
 #[inline]
 pub fn centroid<const N: usize>(vertices: [Point; N]) -> Point {

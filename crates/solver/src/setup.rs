@@ -99,6 +99,13 @@ pub(crate) fn check_coils(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), So
         };
         surfaces.push(ConditionedSurface { name, condition, triangles: mesh.topology().surface(name)? });
     }
+    // What is tangential is known on a perfect conductor under edge elements, as on a flux-parallel wall.
+    for own in setup.conductors.iter().filter(|own| own.law == SurfaceLaw::Perfect) {
+        if setup.family == ElementFamily::Edge {
+            let (name, triangles) = (&own.name, &own.surface[..]);
+            surfaces.push(ConditionedSurface { name, condition: Condition::FluxParallel, triangles });
+        }
+    }
     planes::check(mesh, &setup.coils, &surfaces)
 }
 

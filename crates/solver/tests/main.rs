@@ -16,6 +16,7 @@ mod saturation;
 mod sheet;
 mod solid;
 mod sources;
+mod transmission;
 mod two_level;
 
 use std::sync::Arc;

@@ -432,7 +432,11 @@ fn millimetres(point: [f64; 3]) -> String {
     format!("({x}, {y}, {z})")
 }
 
-/// Four decimals, and no more digits than a sum of element volumes has.
+/// Four decimals, five digits of what is small, and no more digits than a sum of element volumes has.
 fn format_number(value: f64) -> String {
-    if value.abs() < 1e9 { format!("{value:.4}") } else { format!("{value:.6e}") }
+    match value.abs() {
+        1e9.. => format!("{value:.6e}"),
+        0.0 | 0.01.. => format!("{value:.4}"),
+        _ => format!("{value:.4e}"),
+    }
 }

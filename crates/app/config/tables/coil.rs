@@ -401,6 +401,9 @@ impl CoilShape {
     fn analytic(written: ShapeKeys, section: &Section<'_>) -> Self {
         let ShapeKeys { shape, center, axis, direction, half_window, radius, width, height, .. } = written;
         let is_known = shape.is_some();
+        if !is_known {
+            section.silence();
+        }
         let shape = shape.unwrap_or(ShapeWord::Racetrack);
         if written.terminals.is_some() && !section.has("region") {
             section.wrong(

@@ -95,7 +95,6 @@ fn the_same_cells_give_the_same_ratio_whatever_carries_the_shape() {
         let shape = setup.problem.shape().expect("a shape");
         let expected = value(&best) / value(shape.initial());
         let shapes = ShapePair::of(&config, &setup, &best).expect("a design surface");
-        assert_eq!(matches!(shapes, ShapePair::Displacements { .. }), on_nodes);
         let (objective, recorded) =
             verified_in(1, (&config, &source), &shapes, StopReason::ObjectiveConverged, false);
         let found = objective.verification.unwrap_or_else(|| panic!("{:?}", recorded.warnings));
@@ -123,10 +122,30 @@ fn a_smooth_shape_on_nodes_keeps_its_value_on_a_finer_surface() {
     assert!(grid < 0.99, "the shape changes the field: {grid}");
 }
 
+/// Peaks of a grid twice as fine as the cells: what lies between nodes of the run's mesh is there on the fresh one alone.
+#[test]
+fn a_grid_that_is_finer_than_the_cells_has_another_shape_on_a_fresh_mesh() {
+    let (mut config, source) = quick(false);
+    config.output.verify_refinement = 2.0;
+    let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+    let peaks: Vec<f64> = (0..91).map(|k| if k % 2 == 0 { 8e-3 } else { -4e-3 }).collect();
+    for (best, is_another) in [(peaks, true), (dished(&setup), false)] {
+        let shapes = ShapePair::of(&config, &setup, &best).expect("a design surface");
+        let (objective, recorded) =
+            verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
+        let found = objective.verification.unwrap_or_else(|| panic!("{:?}", recorded.warnings));
+        let ShapeDeviation { distance_m, motion_m } = found.deviation.expect("a control grid");
+        println!("F/F0 {}: up to {distance_m} of {motion_m} m", found.ratio);
+        assert_eq!(distance_m > 0.25 * motion_m, is_another, "{distance_m} {motion_m}");
+        assert_eq!(recorded.notices.iter().any(|notice| notice.contains("another shape")), is_another);
+    }
+}
+
 #[test]
 fn a_run_that_was_stopped_is_not_checked() {
     let (config, source) = quick(false);
-    let shapes = ShapePair::Variables([vec![0.0; 91], vec![1e-3; 91]]);
+    let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+    let shapes = ShapePair::of(&config, &setup, &dished(&setup)).expect("a design surface");
     for (reason, interrupted) in [
         (StopReason::Interrupted, false),
         (StopReason::MaxTime, false),

@@ -5,7 +5,7 @@
 //! far above the gain that is to be had, for an objective is not linear over the bounds; how it falls over a run tells whether
 //! a search has converged or was only held in a small trust region.
 
-use crate::nlopt::Sample;
+use crate::nlopt::{ROUNDING, Sample};
 
 /// Constraints nearer to their bound than this share of it hold a design.
 const ACTIVE: f64 = 1e-3;
@@ -55,10 +55,10 @@ struct Room<'a> {
 }
 
 impl Room<'_> {
-    /// Of a variable against its derivative.
+    /// Of a variable against its derivative; none where only rounding is between it and its bound.
     fn against(&self, k: usize, slope: f64) -> f64 {
         let room = if slope > 0.0 { self.design[k] - self.lower[k] } else { self.upper[k] - self.design[k] };
-        room.max(0.0)
+        if room > ROUNDING * (self.upper[k] - self.lower[k]) { room } else { 0.0 }
     }
 
     /// What a gradient promises of all.
@@ -152,6 +152,7 @@ mod tests {
         let least = |design: [f64; 2]| least_promised_gain(&both, &design, &lower, &upper);
         assert!(gain(&both, [0.0, 1.0]) > 0.5 && least([0.0, 1.0]) < 1e-9);
         assert!(least([0.0, 0.5]) > 0.1, "the second has room");
+        assert!(least([0.0, 1.0 - 1e-15]) < 1e-9, "rounding is no room");
         // The slack of a constraint is there to be gained: a slope of 1 up to 9e-4, over the value of ½.
         let nearly = sample(&[-1.0, -0.5], &[(-9e-4, vec![1.0, 0.0])]);
         let by_slack = least_promised_gain(&nearly, &[0.0, 1.0], &lower, &upper);

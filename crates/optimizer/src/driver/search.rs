@@ -129,6 +129,8 @@ impl<'a> Search<'a> {
         match outcome {
             Outcome::Ended(ending) => Ok(self.after_ending(run, ending, gained, evaluations)),
             Outcome::Failed(_) if run.violates() && !self.is_restoring => Ok(NextStep::Restore),
+            // At an optimum that bounds and constraints hold there is no step to be made.
+            Outcome::Failed(_) if run.is_held() => Ok(NextStep::Stop(StopReason::ObjectiveConverged)),
             Outcome::Failed(cause) if run.has_best() => {
                 run.warn(cause);
                 Ok(NextStep::Stop(StopReason::MethodStalled))

@@ -13,7 +13,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
-use fluxmorph_geometry::tet4::{Point, area_vector, cross, dot, norm, sub};
+use fluxmorph_geometry::tet4::{Point, area_vector, barycentric, dot, norm, sub};
 use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
@@ -300,15 +300,6 @@ fn hit(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<Hit> {
     let weights = barycentric(triangle, met);
     let is_inside = weights.into_iter().all(|share| share >= -RIM_TOLERANCE);
     (is_inside && distance > RIM_TOLERANCE * area.sqrt()).then_some(Hit { distance, weights, normal })
-}
-
-/// Barycentric coordinates of a point in the plane of a triangle, by sub-areas.
-fn barycentric(triangle: &[Point; 3], point: Point) -> Point {
-    let normal = area_vector(*triangle);
-    std::array::from_fn(|k| {
-        let edge = sub(triangle[(k + 2) % 3], triangle[(k + 1) % 3]);
-        0.5 * dot(cross(edge, sub(point, triangle[(k + 1) % 3])), normal) / dot(normal, normal)
-    })
 }
 
 #[cfg(test)]

@@ -61,8 +61,23 @@ const CAUTION: f64 = 0.5;
 /// Sweeps over the constraints that a first move breaks: with one of them, or several that share no variable, the first sweep ends it.
 const SWEEPS: usize = 20;
 
+/// Share of its span within which a method leaves a variable that is at one of its bounds.
+pub(crate) const ROUNDING: f64 = 1e-12;
+
+/// Share of the moves to all bounds that counts as these.
+const NEARLY_ALL: f64 = 0.99;
+
 /// Halvings of the factor's exponent: to the last digits that matter to a length.
 const HALVINGS: usize = 60;
+
+/// The largest factor of a range that is too small, and the smallest that is not, where all above one are not.
+fn bisected([mut low, mut high]: [f64; 2], is_enough: impl Fn(f64) -> bool) -> [f64; 2] {
+    for _ in 0..HALVINGS {
+        let middle = (low * high).sqrt();
+        *(if is_enough(middle) { &mut high } else { &mut low }) = middle;
+    }
+    [low, high]
+}
 
 /// A search that begins, in the units that NLopt sees.
 pub(super) struct Start {
@@ -122,15 +137,18 @@ impl Start {
         }
         let share = if algorithm == Algorithm::Ccsaq { CAUTION * share } else { share };
         let within = |share: f64, promise: f64| {
+            let fits = |[largest, promised]: [f64; 2]| largest <= share * self.span && promised <= promise;
             // Twelve orders of magnitude around a factor that makes the steepest term of the order of one.
-            let [mut low, mut high] = [1e-12, 1e12].map(|f| f / (steepest * self.span));
-            for _ in 0..HALVINGS {
-                let middle = (low * high).sqrt();
-                let [largest, promised] = self.moves(algorithm, middle);
-                let fits = largest <= share * self.span && promised <= promise;
-                *(if fits { &mut low } else { &mut high }) = middle;
+            let range = [1e-12, 1e12].map(|f| f / (steepest * self.span));
+            let at_bounds = self.moves(algorithm, range[1]);
+            if !fits(at_bounds) {
+                return bisected(range, |factor| !fits(self.moves(algorithm, factor)))[0];
             }
-            low
+            // All may go to their bounds: a factor that is larger than that takes changes no move, and SQP's least squares break down.
+            let reaches = |[largest, promised]: [f64; 2]| {
+                largest >= NEARLY_ALL * at_bounds[0] && promised >= NEARLY_ALL * at_bounds[1]
+            };
+            bisected(range, |factor| reaches(self.moves(algorithm, factor)))[1]
         };
         let cautious = within(share, PROMISE * self.value.abs());
         cautious.max(within(LEAST * share, f64::INFINITY))
@@ -182,8 +200,9 @@ impl Start {
         (0..self.gradient.len()).map(move |k| free(factor * self.gradient[k].abs()).min(self.room_against(k)))
     }
 
-    /// How far a variable may go against its derivative.
+    /// How far a variable may go against its derivative; not at all where only rounding is between it and its bound.
     fn room_against(&self, k: usize) -> f64 {
-        self.room[usize::from(self.gradient[k] <= 0.0)][k]
+        let room = self.room[usize::from(self.gradient[k] <= 0.0)][k];
+        if room > ROUNDING * self.span { room } else { 0.0 }
     }
 }

@@ -11,6 +11,7 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 pub use derivative_free::{Search, maximise};
+pub(crate) use first_step::ROUNDING;
 pub use gradient::{Algorithm, CONSTRAINT_TOLERANCE, Ending, Minimisation, Outcome, Sample, minimise};
 
 /// Below every objective: returning less makes NLopt stop.

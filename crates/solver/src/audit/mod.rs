@@ -8,13 +8,16 @@
 mod half_space;
 mod layers;
 mod nodal;
+mod transmission;
+mod walls;
 
 pub use half_space::{ExcessLoss, excess_losses};
 pub use layers::CoarseLayers;
 pub use nodal::NodalErrors;
+pub use transmission::{Transmission, transmissions};
 
 use fluxmorph_geometry::box_tree::AxisBox;
-use fluxmorph_geometry::tet4::{Point, area_vector, norm, sub, volume};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub, volume};
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId};
 
 use crate::elements::Order;
@@ -48,6 +51,10 @@ pub struct SkinAudit {
     pub coarse_layers: Option<CoarseLayers>,
     /// Mean thickness `2 V/S` over the skin depth.
     pub thickness_in_skin_depths: f64,
+    /// Share of its surface under which it is thinner than an impedance surface assumes.
+    pub thin_share: f64,
+    /// There the least thickness over the skin depth; infinite where it is that thick everywhere.
+    pub least_thickness_in_skin_depths: f64,
     /// Diagonal of the box around it [m].
     pub extent: f64,
     /// Root of the mean square of its elements' edges, by volume [m].
@@ -90,16 +97,28 @@ impl SkinAudit {
         self.median_elements_per_skin_depth > WEAKEST
     }
 
+    /// How thin it is, where that is too thin for an impedance surface.
+    pub fn thinness(&self) -> Option<String> {
+        let (depths, delta) = (self.thickness_in_skin_depths, Millimetres(self.skin_depth));
+        if depths < IMPEDANCE_THICKNESS {
+            return Some(format!("on average {depths:.1} skin depths ({delta:.3} mm) thick"));
+        }
+        (self.thin_share > TOLERATED_SHARE).then(|| {
+            format!(
+                "thinner than {IMPEDANCE_THICKNESS} skin depths ({delta:.3} mm) under {:.0} % of its surface, down to {:.2} of them",
+                100.0 * self.thin_share,
+                self.least_thickness_in_skin_depths
+            )
+        })
+    }
+
     /// What to tell the user of a conductor that an impedance surface replaces.
     pub fn impedance_warning(&self) -> Option<String> {
-        (self.thickness_in_skin_depths < IMPEDANCE_THICKNESS).then(|| {
+        self.thinness().map(|thinness| {
             format!(
-                "region `{}`: on average {:.1} skin depths ({:.3} mm) thick; an impedance surface assumes {} or more, and \
-                 lets nothing through to the other side. Use model = \"volume\"",
-                self.region,
-                self.thickness_in_skin_depths,
-                Millimetres(self.skin_depth),
-                IMPEDANCE_THICKNESS
+                "region `{}`: {thinness}; an impedance surface assumes {IMPEDANCE_THICKNESS} or more, and lets nothing through to the \
+                 other side. Use model = \"volume\"",
+                self.region
             )
         })
     }
@@ -147,6 +166,12 @@ pub fn skin_audit(
         (order.degree() as f64 * skin_depth / height, face.area)
     };
     let nodes: Vec<[NodeId; 3]> = faces.iter().map(|face| face.nodes).collect();
+    let inwards: Vec<[Point; 3]> = faces.iter().map(|face| face.inwards(mesh)).collect();
+    let walls = walls::walls(&inwards, IMPEDANCE_THICKNESS * skin_depth);
+    let thin =
+        || faces.iter().zip(&walls).filter_map(|(face, wall)| Some((face.area, wall.as_ref()?.thickness)));
+    let thin_share = thin().map(|(area, _)| area).sum::<f64>() / surface;
+    let least_thickness = thin().map(|(_, thickness)| thickness).fold(f64::INFINITY, f64::min);
     let mut layers: Vec<(f64, f64)> =
         looked_at_of(mesh, region, faces).iter().map(elements_per_depth).collect();
     let looked_at: f64 = layers.iter().map(|l| l.1).sum();
@@ -161,6 +186,8 @@ pub fn skin_audit(
         coarse_share: coarse / looked_at,
         coarse_layers: layers::coarse_layers(mesh, region, &nodes, skin_depth, order),
         thickness_in_skin_depths: 2.0 * all_volume / surface / skin_depth,
+        thin_share,
+        least_thickness_in_skin_depths: least_thickness / skin_depth,
         extent: norm(sub(around.upper, around.lower)),
         edge_length: (squares / own_volume).sqrt(),
         relative_permeability: material.relative_permeability,
@@ -176,6 +203,15 @@ pub struct ConductorFace {
     pub element: ElementId,
     /// [m²]
     pub area: f64,
+}
+
+impl ConductorFace {
+    /// Its corners, oriented into the conductor.
+    fn inwards(&self, mesh: &Mesh) -> [Point; 3] {
+        let [a, b, c] = self.nodes.map(|node| mesh.point(node));
+        let under = sub(centroid(mesh.vertices(self.element)), a);
+        if dot(area_vector([a, b, c]), under) > 0.0 { [a, b, c] } else { [a, c, b] }
+    }
 }
 
 /// The faces of the regions of a conductor, as one.
@@ -281,6 +317,24 @@ mod tests {
             let alone = audit(&halves, part, &[]);
             assert!(alone.thickness_in_skin_depths < 0.9 * own.thickness_in_skin_depths, "{alone:?}");
         }
+    }
+
+    /// A slot of 2.5 by 15 mm and 6 mm deep leaves walls of 2.5 and 2 mm: of the surface of 1650 mm² 315 are above or below these.
+    #[test]
+    fn thin_walls_of_a_body_that_is_thick_on_average_are_found() {
+        let is_slot =
+            |x: Point| (0.0025..0.005).contains(&x[0]) && (0.0025..0.0175).contains(&x[1]) && x[2] > 0.002;
+        let mesh = plate(&[0.0, 0.002, 0.004, 0.006, 0.008], |x| if is_slot(x) { 0 } else { 1 });
+        let whole = (RegionId(1), &[RegionId(1)][..]);
+        let audit = skin_audit(&mesh, whole, &COPPER, 8000.0, Order::Linear).expect("it conducts");
+        assert!(audit.thickness_in_skin_depths > IMPEDANCE_THICKNESS, "{audit:?}");
+        assert!((audit.thin_share / (315.0 / 1650.0) - 1.0).abs() < 1e-9, "{audit:?}");
+        assert!(
+            (audit.least_thickness_in_skin_depths * audit.skin_depth / 0.002 - 1.0).abs() < 1e-9,
+            "{audit:?}"
+        );
+        let text = audit.impedance_warning().expect("a warning");
+        assert!(text.contains("under 19 % of its surface, down to 2.71 of them"), "{text}");
     }
 
     /// A core that begins half a skin depth down, of one element: it has no surface, and does not follow the decay.

@@ -290,13 +290,23 @@ impl Observation {
     }
 
     /// Directions in which the vectors in the region and in its images have no mean.
-    fn odd_directions(&self, model: &FieldModel) -> Vec<Point> {
+    fn all_odd_directions(&self, model: &FieldModel) -> Vec<Point> {
         match self.observed {
             Observed::Homogeneity { of: Compared::Vector, .. } => {
                 model.walls().symmetry_planes().odd_directions(model.topology(), self.elements())
             }
             _ => Vec::new(),
         }
+    }
+
+    /// Whether the vectors in the region and in its images have no mean at all.
+    pub fn has_no_mean(&self, model: &FieldModel) -> bool {
+        self.all_odd_directions(model).len() == 3
+    }
+
+    /// The directions in which nothing counts for the mean; where that would be all it is the mean over the region.
+    fn odd_directions(&self, model: &FieldModel) -> Vec<Point> {
+        Some(self.all_odd_directions(model)).filter(|odd| odd.len() < 3).unwrap_or_default()
     }
 
     /// How homogeneous the field is, where that is what is observed.

@@ -66,6 +66,20 @@ impl Walls {
         &self.symmetry
     }
 
+    /// The planes with a condition in which outer faces at some nodes lie, at right angles to each other: a place and the unit normal
+    /// of each.
+    pub(crate) fn planes_at(&self, mesh: &Mesh, nodes: &[NodeId]) -> Vec<[Point; 2]> {
+        let nodes: BTreeSet<NodeId> = nodes.iter().copied().collect();
+        let mut planes: Vec<Plane> = Vec::new();
+        for (_, face, condition) in self.faces.iter().filter(|(node, ..)| nodes.contains(node)) {
+            let plane = Plane::of(mesh, *face, *condition);
+            if plane.condition != Condition::Other && planes.iter().all(|known| known.is_square_to(&plane)) {
+                planes.push(plane);
+            }
+        }
+        planes.into_iter().map(|plane| [plane.place, plane.normal]).collect()
+    }
+
     /// The planes of the outer faces at a node that are at right angles to each other; one with a part of another condition, or with
     /// an element at the node behind it, as one of another condition.
     fn at(&self, topology: &Topology, mesh: &Mesh, node: NodeId) -> Vec<Plane> {

@@ -63,11 +63,14 @@ impl Plane {
     }
 
     /// Whether the field beyond it is the image of that of the mesh: which lies on one side of it, with no outer face of another condition
-    /// in the plane.
+    /// in the plane. Natural faces have that of flux-normal ones.
     pub(super) fn is_symmetry(&self, mesh: &Mesh, conditions: &HashMap<[NodeId; 3], Condition>) -> bool {
         let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
         let mut in_plane = outer.filter(|facet| facet.nodes.iter().all(|&n| self.holds(mesh.point(n))));
-        let is_alike = |facet: &Facet| conditions.get(&face_key(facet.nodes)) == Some(&self.condition);
+        let is_alike = |facet: &Facet| {
+            let condition = conditions.get(&face_key(facet.nodes)).copied().unwrap_or(Condition::FluxNormal);
+            condition == self.condition
+        };
         self.condition != Condition::Other
             && !self.is_crossed(mesh.points().iter().copied())
             && in_plane.all(is_alike)
