@@ -284,6 +284,13 @@ fn planes_are_judged_by_their_faces_and_not_by_their_names() {
     let [beside, _] = of("\"plane\"", ", \"strip\"");
     println!("{field:.5e} T, with a sheet far away {beside:.5e} T; {spread:.5e}");
     assert!((beside / field - 1.0).abs() < 0.02, "{beside} {field}");
+    // A plane without condition has no image, whatever holds in a strip of it.
+    let refused = finish(
+        command(&[&"check", &config])
+            .args(set(&["boundaries.flux_normal=[]", "boundaries.flux_parallel=[\"z_max\", \"strip\"]"])),
+    )
+    .exits_with(3);
+    assert!(refused.stderr.contains("lies outside the mesh"), "{}", refused.stderr);
     let divided = set(&[
         "boundaries.flux_normal=[\"plane\"]",
         "boundaries.flux_parallel=[\"z_max\", \"strip\"]",

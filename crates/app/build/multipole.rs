@@ -1,7 +1,10 @@
 //! Expansions of a configuration on its mesh and states.
 
+use std::collections::HashSet;
+
 use fluxmorph_geometry::box_tree::AxisBox;
-use fluxmorph_geometry::tet4::{centroid, norm, sub};
+use fluxmorph_geometry::tet4::{Point, barycentric};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, millimetres};
 use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::coil::Frame;
@@ -11,7 +14,9 @@ use fluxmorph_solver::{FieldModel, Functional, SolverError};
 
 use super::functional::follow;
 use super::locate_error::DiagnosticSink;
+use super::motion::distance_to_line;
 use super::references::functionals;
+use super::soundness::faces_of;
 use crate::config::{self, Config, Diagnostic, ExpansionShape, MultipoleSet, ObjectiveKind, SourceMap};
 use crate::error::Error;
 
@@ -108,10 +113,11 @@ pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) 
     let (mesh, states) = (problem.original(), problem.states());
     let mut sink = DiagnosticSink::new(config, source, Vec::new());
     for (k, set) in config.multipoles.iter().enumerate() {
-        if let Some(axis) = divided_plane(config, set, mesh)? {
+        if let Some(axis) = Planes::of(config, set, (&states[0], mesh)).divided {
             let message = format!(
-                "the expansion `{}` ends at a plane across {axis} that is flux-parallel and flux-normal within its radius",
-                set.name
+                "the expansion `{}` ends at a plane across {} that is flux-parallel and flux-normal within its radius",
+                set.name,
+                ["x", "y", "z"][axis]
             );
             let fault = source.diagnostic(&format!("multipoles[{k}].radius"), message);
             sink.push(
@@ -147,7 +153,7 @@ fn disturbance(
     problem: &Problem,
     mesh: &Mesh,
 ) -> Result<Option<(String, &'static str)>, Error> {
-    let planes = planes(config, set, mesh)?;
+    let planes = Planes::of(config, set, (&problem.states()[0], mesh)).mirrors;
     let bounds = AxisBox::around(mesh.bounding_box());
     let disturbed = Multipoles::disturbance(problem.states(), mesh, &expansion(set)?, &planes);
     // Beyond the box of the mesh it is no hole.
@@ -178,7 +184,7 @@ pub(crate) fn multipoles(
     model: &FieldModel,
 ) -> Result<Multipoles, Error> {
     let expansion = expansion(set)?;
-    let planes = planes(config, set, mesh)?;
+    let planes = Planes::of(config, set, (model, mesh)).mirrors;
     // What is reported is what is made of it.
     let named =
         functionals(config).into_iter().map(|(_, f)| f).filter(|f| f.region.as_ref() == Some(&set.name));
@@ -203,50 +209,52 @@ pub(super) fn functional(
     Ok(Functional::multipole(multipoles(config, set, mesh, model)?, of)?)
 }
 
-/// The symmetry planes through the centre of an expansion, by the faces that lie in it: what holds elsewhere in such a plane is no matter of
-/// the images of a circle or ball.
-fn planes(config: &Config, set: &MultipoleSet, mesh: &Mesh) -> Result<Vec<MirrorPlane>, Error> {
-    let boundaries = &config.boundaries;
-    let parallel = boundaries.flux_parallel.iter().map(|name| (name, -1.0));
-    let normal = boundaries.flux_normal.iter().map(|name| (name, 1.0));
-    let tolerance = OFF_CENTRE * set.radius;
-    // By axis, the distance of the nearest face [m].
-    let mut nearest: [Option<(f64, MirrorPlane)>; 3] = [None; 3];
-    for (surface, across) in parallel.chain(normal) {
-        for triangle in mesh.topology().surface(surface)? {
-            let corners = triangle.map(|node| mesh.point(node));
-            let distance = norm(sub(centroid(corners), set.center));
-            for axis in 0..3 {
-                let is_through = corners.iter().all(|x| (x[axis] - set.center[axis]).abs() <= tolerance);
-                if is_through && nearest[axis].is_none_or(|(least, _)| distance < least) {
-                    nearest[axis] = Some((distance, MirrorPlane { axis, at: set.center[axis], across }));
-                }
-            }
-        }
-    }
-    Ok(nearest.into_iter().flatten().map(|(_, plane)| plane).collect())
+/// The planes through the centre of an expansion, as its images see them.
+struct Planes {
+    /// Those of symmetry.
+    mirrors: Vec<MirrorPlane>,
+    /// The axis of one of which faces within the radius have both conditions.
+    divided: Option<usize>,
 }
 
-/// A plane through the centre of an expansion of which faces within its radius have both conditions: no image goes on behind it.
-fn divided_plane(config: &Config, set: &MultipoleSet, mesh: &Mesh) -> Result<Option<&'static str>, Error> {
-    let planes = planes(config, set, mesh)?;
-    let boundaries = &config.boundaries;
-    for (names, across) in [(&boundaries.flux_parallel, -1.0), (&boundaries.flux_normal, 1.0)] {
-        for surface in names {
-            for triangle in mesh.topology().surface(surface)? {
-                let corners = triangle.map(|node| mesh.point(node));
-                let reaches = corners.iter().any(|x| norm(sub(*x, set.center)) < set.radius);
-                let lies_in = |plane: &&MirrorPlane| {
-                    let off = OFF_CENTRE * set.radius;
-                    corners.iter().all(|x| (x[plane.axis] - plane.at).abs() <= off)
-                };
-                if let Some(plane) =
-                    planes.iter().find(lies_in).filter(|plane| reaches && plane.across != across)
-                {
-                    return Ok(Some(["x", "y", "z"][plane.axis]));
-                }
-            }
+impl Planes {
+    /// By the outer faces that reach within the radius: what holds elsewhere in such a plane is no matter of the images of a circle or
+    /// ball. A face without condition is flux-normal beside others, and makes no plane alone.
+    fn of(config: &Config, set: &MultipoleSet, (model, mesh): (&FieldModel, &Mesh)) -> Self {
+        let boundaries = &config.boundaries;
+        let named = |names: &[String]| faces_of(mesh.topology(), names.iter().map(String::as_str));
+        let (parallel, normal) = (named(&boundaries.flux_parallel), named(&boundaries.flux_normal));
+        let replaced = model.conductors().iter().flat_map(|own| &own.surface);
+        let replaced: HashSet<_> = replaced.map(|face| face_key(*face)).collect();
+        // By axis: whether faces are flux-parallel, flux-normal, and so without a word.
+        let mut found = [[false; 3]; 3];
+        for facet in mesh.topology().facets().iter().filter(|facet| facet.outside.is_none()) {
+            let (key, corners) = (face_key(facet.nodes), facet.nodes.map(|node| mesh.point(node)));
+            let off = |axis: usize| {
+                corners.iter().map(|x| (x[axis] - set.center[axis]).abs()).fold(0.0_f64, f64::max)
+            };
+            let Some(axis) = (0..3).find(|&axis| off(axis) <= OFF_CENTRE * set.radius) else { continue };
+            let kind = match () {
+                () if parallel.contains(&key) => 0,
+                () if normal.contains(&key) => 1,
+                () if replaced.contains(&key) => continue,
+                () => 2,
+            };
+            found[axis][kind] |= reaches(&corners, set);
         }
+        let mirrors = (0..3).filter(|&axis| found[axis][0] || found[axis][1]).map(|axis| {
+            let across = if found[axis][0] { -1.0 } else { 1.0 };
+            MirrorPlane { axis, at: set.center[axis], across }
+        });
+        let is_divided = |axis: &usize| found[*axis][0] && (found[*axis][1] || found[*axis][2]);
+        Self { mirrors: mirrors.collect(), divided: (0..3).find(is_divided) }
     }
-    Ok(None)
+}
+
+/// Whether a triangle in a plane through the centre of an expansion comes within its radius.
+fn reaches(corners: &[Point; 3], set: &MultipoleSet) -> bool {
+    let [a, b, c] = *corners;
+    let nearest = [[a, b], [b, c], [c, a]].map(|edge| distance_to_line(set.center, edge));
+    nearest.into_iter().any(|distance| distance < set.radius)
+        || barycentric(corners, set.center).iter().all(|weight| *weight >= 0.0)
 }

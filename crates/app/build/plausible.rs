@@ -204,10 +204,10 @@ fn wave_warning(config: &Config, mesh: &Mesh) -> Option<String> {
     let (length, size) = (SPEED_OF_LIGHT / frequency, size(mesh));
     (size > LARGEST_PART_OF_A_WAVE * length).then(|| {
         format!(
-            "at {frequency:e} Hz a wave in air is {:.3} mm long, and the mesh is {:.3} mm from corner to corner: \
+            "at {frequency:e} Hz a wave in air is {:.3} m long, and the mesh is {:.3} m from corner to corner: \
              displacement currents, which are left out, are no longer small there",
-            Millimetres(length),
-            Millimetres(size)
+            Millimetres(1e-3 * length),
+            Millimetres(1e-3 * size)
         )
     })
 }
@@ -262,9 +262,11 @@ fn overlap_warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<S
             CoilShape::Region(own) => Some((j, mesh.topology().region(&own.region).ok()?)),
             _ => None,
         });
-        let place =
-            |region| place_of_current(mesh, winding, |e| mesh.topology().region_of()[e.index()] == region);
-        let met = of_regions.filter_map(|(j, region)| Some(text([*i, j], place(region)?.1)));
+        let place = |region| {
+            let mut elements = mesh.topology().elements_of(region).into_iter();
+            elements.find_map(|e| winding.wound_place(mesh.vertices(e)))
+        };
+        let met = of_regions.filter_map(|(j, region)| Some(text([*i, j], place(region)?)));
         met.collect::<Vec<String>>()
     };
     let pairs =

@@ -191,7 +191,7 @@ impl Accuracy {
     /// it, there is no ratio: half of the gain must then be left in the unit of the objective.
     pub fn judge(&mut self, [initial, best]: [f64; 2], others: &[[f64; 2]]) {
         let gain = best / initial - 1.0;
-        if gain.abs() < LEAST_GAIN || others.is_empty() {
+        if gain.is_nan() || gain.abs() < LEAST_GAIN || others.is_empty() {
             return;
         }
         let has_ratio = best / initial > 0.0 && initial.abs() >= LEAST_START * best.abs();

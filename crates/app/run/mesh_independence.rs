@@ -13,6 +13,7 @@
 //!
 //! Does not live here: whether the gradient is the objective's, which is `verify`.
 
+use fluxmorph_geometry::Millimetres;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::driver::StopReason;
@@ -33,9 +34,12 @@ use crate::show::{self, Observer};
 /// second-order edge elements of `shield_edge.toml`, which would take twenty minutes after a search of three, 29.
 const MOST_EVALUATIONS: f64 = 25.0;
 
-/// Share of its motion that the surface of a control grid may be from that of the run, and share of the gain that the two ratios
-/// may be apart: beyond both, the difference may be one of shapes.
-const LARGEST_DEVIATION: [f64; 2] = [0.1, 0.1];
+/// Share of its motion by which the surface of a control grid may be off that of the run: between the nodes of coarse cells a smooth
+/// shape is off by some percent.
+const LARGEST_DEVIATION: f64 = 0.1;
+
+/// Share of the gain by which both ratios may be apart all the same.
+const LARGEST_DIFFERENCE: f64 = 0.1;
 
 /// Whether a check was finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -276,16 +280,15 @@ fn verification(
 /// That the best shape on a fresh mesh is so far from that of the run that their ratios, which differ, may be those of two shapes.
 fn of_another_shape(found: &Verification, ratio: f64) -> Option<String> {
     let ShapeDeviation { distance_m, motion_m } = found.deviation?;
-    let [of_motion, of_gain] = LARGEST_DEVIATION;
-    let is_another =
-        distance_m > of_motion * motion_m && (found.ratio - ratio).abs() > of_gain * (ratio - 1.0).abs();
+    let is_another = distance_m > LARGEST_DEVIATION * motion_m
+        && (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs();
     is_another.then(|| {
         format!(
             "F/F0 on the fresh mesh, {}, is that of another shape: up to {:.3} mm from that of the run, of {:.3} mm of motion, as the \
              control grid is finer than the cells of the surface, or bends within them; a coarser grid or smaller cells have one shape",
             show::ratio(found.ratio),
-            1e3 * distance_m,
-            1e3 * motion_m
+            Millimetres(distance_m),
+            Millimetres(motion_m)
         )
     })
 }

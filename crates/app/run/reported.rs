@@ -12,6 +12,7 @@ use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_optimizer::body::{Body, BodyForce};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::circuit::{currents, direct_resistances, flux_linkages};
+use fluxmorph_solver::element::amplitude;
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
 
@@ -170,11 +171,10 @@ impl Reported {
         for (probe, points) in &self.probes {
             let own = errors.probes_t.get(probe);
             let error = |k: usize| own.and_then(|errors| *errors.get(k)?).unwrap_or(f64::NAN);
-            let size = |b: &[c64; 3]| b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
             let points = points
                 .iter()
                 .enumerate()
-                .map(|(k, b)| (probe.clone(), b.as_ref().map_or(0.0, size), error(k)));
+                .map(|(k, b)| (probe.clone(), b.as_ref().map_or(0.0, amplitude), error(k)));
             all.extend(shares_of("B at the probe", points.collect()));
         }
         all

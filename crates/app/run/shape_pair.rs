@@ -62,9 +62,11 @@ impl ShapePair {
             return Ok(ShapesOnMesh { displacements, ..ShapesOnMesh::default() });
         };
         let fresh = design_triangulation(design, &setup.full_mesh)?;
-        let [initial, best] = change.displacements.each_ref().map(|d| change.surface.transfer(d, &fresh));
+        let [initial, best] = &change.displacements;
+        let best = change.surface.transfer(best, &fresh);
         let Some(variables) = &change.variables else {
-            let displacements = [initial.map_err(OptimizerError::from)?, best.map_err(OptimizerError::from)?];
+            let initial = change.surface.transfer(initial, &fresh).map_err(OptimizerError::from)?;
+            let displacements = [initial, best.map_err(OptimizerError::from)?];
             return Ok(ShapesOnMesh { displacements, ..ShapesOnMesh::default() });
         };
         let displacements = variables.each_ref().map(|p| shape.displacement(p));

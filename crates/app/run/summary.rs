@@ -345,7 +345,7 @@ pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) 
     let worse = |a: &f64, b: &f64| objective.combination == Combination::WorstCase && b > a;
     let (_, quality, model) = qualities.reduce(|a, b| if worse(&a.0, &b.0) { b } else { a })?;
     let weight = match terms.as_slice() {
-        [term] if term.states.len() == 1 => Some(objective.goal.sign() * term.weight),
+        [term] if term.states.len() == 1 => Some(term.weight),
         _ => None,
     };
     Some(HomogeneityResult {

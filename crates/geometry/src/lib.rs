@@ -26,6 +26,7 @@ pub mod mesh;
 pub mod millimetres;
 pub mod parallel;
 pub mod quality;
+pub mod ray;
 pub mod refine;
 pub mod soundness;
 pub mod tet4;

@@ -11,7 +11,7 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use fluxmorph_geometry::tet4::centroid;
 use fluxmorph_geometry::{ElementId, Mesh};
 
-use crate::element::Complex3;
+use crate::element::amplitude;
 use crate::error::SolverError;
 use crate::line_search::{self, Along};
 use crate::linear::{Goal, Left, LinearSolverReport, PreparedSystem};
@@ -238,12 +238,11 @@ fn least_settled(
 ) -> (ElementId, f64) {
     let elements = model.elements_with_a_law();
     let fields = |of: &FieldSolution| of.flux_densities_of(model, mesh, elements);
-    let size = |b: Complex3| b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
     let mut worst = (elements[0], 0.0, -1.0);
     for ((&e, a), b) in elements.iter().zip(fields(from)).zip(fields(to)) {
-        let change = size(std::array::from_fn(|d| b[d] - a[d]));
+        let change = amplitude(&std::array::from_fn(|d| b[d] - a[d]));
         if change > worst.2 {
-            worst = (e, size(a), change);
+            worst = (e, amplitude(&a), change);
         }
     }
     (worst.0, worst.1)

@@ -90,6 +90,11 @@ impl<'a> Section<'a> {
         self.silent.set(true);
     }
 
+    /// Nothing is said of keys that have a use beside other values: which of these is meant is not known.
+    pub(super) fn excuse_hidden(&self) {
+        self.former.borrow_mut().extend(self.hidden.borrow().iter());
+    }
+
     /// The value of a key that is known from here on.
     fn entry(&self, key: &'static str) -> Option<Entry<'a>> {
         if self.hidden.borrow().contains(&key) {

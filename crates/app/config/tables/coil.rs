@@ -402,7 +402,7 @@ impl CoilShape {
         let ShapeKeys { shape, center, axis, direction, half_window, radius, width, height, .. } = written;
         let is_known = shape.is_some();
         if !is_known {
-            section.silence();
+            section.excuse_hidden();
         }
         let shape = shape.unwrap_or(ShapeWord::Racetrack);
         if written.terminals.is_some() && !section.has("region") {

@@ -12,16 +12,13 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
-use fluxmorph_geometry::tet4::{Point, area_vector, barycentric, dot, norm, sub};
+use fluxmorph_geometry::box_tree::BoxTree;
+use fluxmorph_geometry::ray::{Hit, hit, reach};
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
 use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
 use crate::design::DesignSurface;
-
-/// Nodes at the rim of the body send their ray along its side, and those at the edge of a step along that: how far outside a triangle
-/// still hits.
-const RIM_TOLERANCE: f64 = 1e-6;
 
 /// Sine of the angle (six degrees) between ray and triangle below which the triangle belongs to the body's side: facets of a
 /// round side lean by less, and an opposite face as steep as that makes no body whose thickness means anything.
@@ -265,41 +262,10 @@ impl BodyFaces {
     }
 }
 
-/// Where a ray meets a triangle.
-struct Hit {
-    /// Distance along it [m].
-    distance: f64,
-    /// The weights of the corners.
-    weights: Point,
-    /// That of the triangle, of any length.
-    normal: Point,
-}
-
 /// Whether a ray runs along a triangle rather than through it.
 fn runs_along(direction: Point, triangle: &[Point; 3]) -> bool {
     let normal = area_vector(*triangle);
     dot(normal, direction).abs() < GRAZING * norm(normal)
-}
-
-/// A box that holds every place where a ray counts as hitting a triangle.
-fn reach(triangle: &[Point; 3]) -> AxisBox {
-    let tight = AxisBox::around(triangle);
-    tight.grown(10.0 * RIM_TOLERANCE * tight.extent())
-}
-
-/// Where a ray meets a triangle that it does not touch at its origin.
-fn hit(origin: Point, direction: Point, triangle: &[Point; 3]) -> Option<Hit> {
-    let normal = area_vector(*triangle);
-    let slope = dot(normal, direction);
-    let area = norm(normal);
-    if slope.abs() < RIM_TOLERANCE * area {
-        return None;
-    }
-    let distance = dot(normal, sub(triangle[0], origin)) / slope;
-    let met: Point = std::array::from_fn(|d| origin[d] + distance * direction[d]);
-    let weights = barycentric(triangle, met);
-    let is_inside = weights.into_iter().all(|share| share >= -RIM_TOLERANCE);
-    (is_inside && distance > RIM_TOLERANCE * area.sqrt()).then_some(Hit { distance, weights, normal })
 }
 
 #[cfg(test)]

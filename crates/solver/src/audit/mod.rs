@@ -101,11 +101,11 @@ impl SkinAudit {
     pub fn thinness(&self) -> Option<String> {
         let (depths, delta) = (self.thickness_in_skin_depths, Millimetres(self.skin_depth));
         if depths < IMPEDANCE_THICKNESS {
-            return Some(format!("on average {depths:.1} skin depths ({delta:.3} mm) thick"));
+            return Some(format!("on average {depths:.1} skin depths of {delta:.3} mm thick"));
         }
         (self.thin_share > TOLERATED_SHARE).then(|| {
             format!(
-                "thinner than {IMPEDANCE_THICKNESS} skin depths ({delta:.3} mm) under {:.0} % of its surface, down to {:.2} of them",
+                "thinner than {IMPEDANCE_THICKNESS} skin depths of {delta:.3} mm under {:.0} % of its surface, down to {:.2} of them",
                 100.0 * self.thin_share,
                 self.least_thickness_in_skin_depths
             )

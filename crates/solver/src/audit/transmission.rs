@@ -2,12 +2,12 @@
 //!
 //! A wave that enters a wall of the thickness `t` with `A_t` along its face reaches the other one as `A_t e^(−γt)`, `γ = (1 + j)/δ`,
 //! and is doubled there, where hardly any current leaves it. So the flux density across the face behind is `2 e^(−t/δ)` of that
-//! across the face in front, and behind iron `|1 + (1 − j) μr δ/r|` times less, by the impedance of air over the distance `r` to the
-//! wall (for a shell in a uniform field the limit of H. Kaden, Wirbelströme und Schirmung in der
-//! Nachrichtentechnik, Springer 1959). What that makes at a place is taken from its mean square over the solid angle of the faces that it sees, with
-//! their images in symmetry planes that cut the wall: all of it before a wide wall; √3 times as much inside a closed one, where the mean square of
-//! the normal component of a uniform field is a third; less before a small one. Walls that stand behind others are seen, too. So
-//! this is about what passes, and tells whether it matters.
+//! across the face in front, and behind iron `|1 + (1 − j) μr δ/r|` times less, by the impedance of air over the distance `r` to
+//! the wall (for a shell in a uniform field the limit of H. Kaden, Wirbelströme und Schirmung in der Nachrichtentechnik,
+//! Springer 1959). What that makes at a place is taken from its mean square over the solid angle of the faces that it sees, with
+//! their images in symmetry planes that cut the wall: all of it before a wide wall; √3 times as much inside a closed one, where
+//! the mean square of the normal component of a uniform field is a third; less before a small one. Walls that stand behind others
+//! are seen, too. So this is about what passes, and tells whether it matters.
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
@@ -22,6 +22,7 @@ use rayon::prelude::*;
 use super::walls::{Wall, walls};
 use crate::element::dot3;
 use crate::model::FieldModel;
+use crate::recovery::Plane;
 use crate::solution::FieldSolution;
 use crate::surface::{Conductor, SurfaceLaw};
 
@@ -86,15 +87,11 @@ pub fn transmissions(
     model.conductors().iter().filter_map(of).collect()
 }
 
-/// A place with its images in planes, each a place and a unit normal.
-fn images(place: Point, planes: &[[Point; 2]]) -> Vec<Point> {
+/// A place with its images in planes.
+fn images(place: Point, planes: &[Plane]) -> Vec<Point> {
     let mut all = vec![place];
-    for [origin, normal] in planes {
-        let image = |x: &Point| -> Point {
-            let twice = 2.0 * dot(*normal, sub(*x, *origin));
-            std::array::from_fn(|d| x[d] - twice * normal[d])
-        };
-        let beyond: Vec<Point> = all.iter().map(image).collect();
+    for plane in planes {
+        let beyond: Vec<Point> = all.iter().map(|x| plane.image(*x)).collect();
         all.extend(beyond);
     }
     all

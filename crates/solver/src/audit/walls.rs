@@ -1,12 +1,10 @@
 //! How thick conductors are under their faces, by rays.
 
-use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
+use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::directions::unit;
-use fluxmorph_geometry::tet4::{Point, area_vector, barycentric, centroid, dot, sub};
+use fluxmorph_geometry::ray::{hit, reach};
+use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot};
 use rayon::prelude::*;
-
-/// Share of a triangle by which a ray may pass it and meets it all the same.
-const RIM: f64 = 1e-9;
 
 /// Where the ray from the middle of a face into a conductor meets another one of its faces.
 #[derive(Clone, Copy, Debug)]
@@ -20,19 +18,14 @@ pub(super) struct Wall {
 /// The wall under every triangle of a surface that is oriented into its body; `None` where it is thicker than `most` [m], or ends at a
 /// symmetry plane.
 pub(super) fn walls(corners: &[[Point; 3]], most: f64) -> Vec<Option<Wall>> {
-    let tree = BoxTree::new(corners.iter().map(AxisBox::around).collect());
+    let tree = BoxTree::new(corners.iter().map(reach).collect());
     let of = |own: &[Point; 3]| {
         let (origin, direction) = (centroid(*own), unit(area_vector(*own)));
         let meets = |k: usize| {
-            let normal = area_vector(corners[k]);
-            let slope = dot(normal, direction);
-            let thickness = dot(normal, sub(corners[k][0], origin)) / slope;
-            let met = std::array::from_fn(|d| origin[d] + thickness * direction[d]);
+            let met = hit(origin, direction, &corners[k])?;
             // The face opposite looks towards the ray.
-            let is_met = slope < 0.0
-                && (0.0..=most).contains(&thickness)
-                && barycentric(&corners[k], met).iter().all(|weight| *weight >= -RIM);
-            is_met.then_some(Wall { thickness, opposite: k })
+            let is_wall = dot(met.normal, direction) < 0.0 && (0.0..=most).contains(&met.distance);
+            is_wall.then_some(Wall { thickness: met.distance, opposite: k })
         };
         let met = tree.hits(origin, direction).into_iter().filter_map(meets);
         met.min_by(|a, b| a.thickness.total_cmp(&b.thickness))

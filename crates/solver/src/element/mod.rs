@@ -41,6 +41,11 @@ pub(crate) fn dot3(x: Complex3, y: Complex3) -> c64 {
     x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 }
 
+/// `|x|`: the root of the sum of the squares of all amplitudes.
+pub fn amplitude(x: &Complex3) -> f64 {
+    x.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt()
+}
+
 /// `x × y`, without conjugation.
 #[inline]
 pub(crate) fn cross3(x: Complex3, y: Complex3) -> Complex3 {

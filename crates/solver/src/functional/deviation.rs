@@ -13,7 +13,6 @@ use rayon::prelude::*;
 
 use super::{Functional, MultipoleFunctional, Observation};
 use crate::Order;
-use crate::element::Complex3;
 use crate::model::FieldModel;
 use crate::recovery::RecoveredPoint;
 use crate::solution::FieldSolution;
@@ -79,9 +78,4 @@ fn signed(left: [Option<c64>; 2]) -> f64 {
 
 fn size(left: [Option<c64>; 2]) -> f64 {
     left.iter().flatten().map(|c| c.norm_sqr()).sum::<f64>().sqrt()
-}
-
-/// `|b|`.
-pub(super) fn length(b: Complex3) -> f64 {
-    b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt()
 }

@@ -12,10 +12,9 @@ use fluxmorph_geometry::tet4::{Point, point_at, volume as volume_of};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 
 use super::FunctionalValue;
-use super::deviation::length;
 use super::homogeneity::{Compared, FieldQuality, Spread};
 use crate::element::quadrature::{self, Node};
-use crate::element::{Complex3, dot3};
+use crate::element::{Complex3, amplitude, dot3};
 use crate::elements::Order;
 use crate::error::SolverError;
 use crate::model::FieldModel;
@@ -343,7 +342,7 @@ impl Observation {
         Some(move |b: Complex3| {
             let own = compared.of(&b);
             let missed: Complex3 = std::array::from_fn(|d| own[d] - ideal[d]);
-            if has_sign { missed[0].re } else { length(missed) }
+            if has_sign { missed[0].re } else { amplitude(&missed) }
         })
     }
 

@@ -54,7 +54,8 @@ impl FieldModel {
         let conductors = weak_form.conductors();
         solids::check(mesh, &setup.coils, (&conductors, &setup.materials), &setup.boundaries)?;
         let gradients: &[_] = if setup.family == ElementFamily::Nodal { &conductors.surface } else { &[] };
-        let walls = Walls::new(mesh, &setup.boundaries, gradients)?;
+        let replaced = setup.conductors.iter().flat_map(|own| own.surface.iter().copied());
+        let walls = Walls::new(mesh, &setup.boundaries, replaced, gradients)?;
         // The net current of a solid conductor is given: no other returns through it.
         let conductors = conductors.without(&solids::elements(&setup.coils));
         let mut joined = conductors.joined(mesh, &setup.boundaries)?;

@@ -39,17 +39,22 @@ pub(super) struct Mirrors {
 }
 
 impl Walls {
-    /// Of the conditions of a model. On the `gradients`, faces of walls beside re-entrant edges, nodal `A_t` is `−∇ψ` and not zero.
+    /// Of the conditions of a model, whose `replaced` faces are those of conductors that are not meshed. On the `gradients`, faces of
+    /// walls beside re-entrant edges, nodal `A_t` is `−∇ψ` and not zero.
     ///
     /// # Errors
     /// [`MeshError::UnknownSurface`].
     pub(crate) fn new(
         mesh: &Mesh,
         boundaries: &[(String, Boundary)],
+        replaced: impl Iterator<Item = [NodeId; 3]>,
         gradients: &[[NodeId; 3]],
     ) -> Result<Self, MeshError> {
         let topology = mesh.topology();
         let mut conditions = conditions(topology, boundaries)?;
+        replaced.for_each(|face| {
+            conditions.entry(face_key(face)).or_insert(Condition::Other);
+        });
         let symmetry = SymmetryPlanes::new(mesh, boundaries, &conditions)?;
         conditions.extend(gradients.iter().map(|face| (face_key(*face), Condition::Other)));
         let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
@@ -66,9 +71,8 @@ impl Walls {
         &self.symmetry
     }
 
-    /// The planes with a condition in which outer faces at some nodes lie, at right angles to each other: a place and the unit normal
-    /// of each.
-    pub(crate) fn planes_at(&self, mesh: &Mesh, nodes: &[NodeId]) -> Vec<[Point; 2]> {
+    /// The planes with a condition in which outer faces at some nodes lie, at right angles to each other.
+    pub(crate) fn planes_at(&self, mesh: &Mesh, nodes: &[NodeId]) -> Vec<Plane> {
         let nodes: BTreeSet<NodeId> = nodes.iter().copied().collect();
         let mut planes: Vec<Plane> = Vec::new();
         for (_, face, condition) in self.faces.iter().filter(|(node, ..)| nodes.contains(node)) {
@@ -77,7 +81,7 @@ impl Walls {
                 planes.push(plane);
             }
         }
-        planes.into_iter().map(|plane| [plane.place, plane.normal]).collect()
+        planes
     }
 
     /// The planes of the outer faces at a node that are at right angles to each other; one with a part of another condition, or with
@@ -217,10 +221,7 @@ impl Mirrors {
 
     /// The image of a place.
     pub(super) fn place(&self, image: Image, x: Point) -> Point {
-        self.through(image).fold(x, |x, plane| {
-            let twice = 2.0 * plane.height(x);
-            std::array::from_fn(|d| x[d] - twice * plane.normal[d])
-        })
+        self.through(image).fold(x, |x, plane| plane.image(x))
     }
 
     /// The image of a direction.

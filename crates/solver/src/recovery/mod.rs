@@ -40,6 +40,7 @@ use fit::Fit;
 pub(crate) use mirror::Walls;
 use mirror::{Image, Mirrors};
 pub(crate) use places::{BlendedField, FixedPlaces};
+pub(crate) use plane::Plane;
 
 /// How fast the weight of a node falls, and that of a point within an element ([`Fit::new`]): most nodes lie on the rim of a patch,
 /// and where it lies to one side of the point, values of `B` far from it keep a fit from swinging there. Of the values from

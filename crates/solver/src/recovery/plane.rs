@@ -16,7 +16,7 @@ pub(super) const ROUNDING: f64 = 1e-3;
 
 /// What holds on a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Condition {
+pub(crate) enum Condition {
     FluxParallel,
     FluxNormal,
     /// Anything else: `A` is given, is a gradient along the face, or free.
@@ -25,7 +25,7 @@ pub(super) enum Condition {
 
 /// A symmetry plane.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plane {
+pub(crate) struct Plane {
     pub(super) place: Point,
     /// Of unit length.
     pub(super) normal: Point,
@@ -62,8 +62,8 @@ impl Plane {
         Self { place: mesh.point(face[0]), normal, condition }
     }
 
-    /// Whether the field beyond it is the image of that of the mesh: which lies on one side of it, with no outer face of another condition
-    /// in the plane. Natural faces have that of flux-normal ones.
+    /// Whether the field beyond it is the image of that of the mesh: which lies on one side of it, with no outer face of another
+    /// condition in the plane. Natural faces have that of flux-normal ones.
     pub(super) fn is_symmetry(&self, mesh: &Mesh, conditions: &HashMap<[NodeId; 3], Condition>) -> bool {
         let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
         let mut in_plane = outer.filter(|facet| facet.nodes.iter().all(|&n| self.holds(mesh.point(n))));
@@ -87,6 +87,12 @@ impl Plane {
     /// How far a point lies off it on the side of the normal [m].
     pub(super) fn height(&self, x: Point) -> f64 {
         dot(self.normal, sub(x, self.place))
+    }
+
+    /// The image of a place.
+    pub(crate) fn image(&self, x: Point) -> Point {
+        let twice = 2.0 * self.height(x);
+        std::array::from_fn(|d| x[d] - twice * self.normal[d])
     }
 
     pub(super) fn holds(&self, x: Point) -> bool {

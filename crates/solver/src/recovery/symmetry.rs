@@ -42,21 +42,24 @@ impl SymmetryPlanes {
     ) -> Result<Self, MeshError> {
         let mut all = Self::default();
         for (name, _) in boundaries {
-            let surface = mesh.topology().surface(name)?;
-            let flat = flat_parts(mesh, surface.iter().copied(), conditions);
-            let beside_round = || {
-                let round = round_faces(mesh, surface);
-                flat_parts(mesh, surface.iter().copied().filter(|face| !round.contains(face)), conditions)
-            };
-            let Some((planes, of_faces)) = flat.or_else(beside_round) else { continue };
-            let is_symmetry: Vec<bool> =
-                planes.iter().map(|plane| plane.is_symmetry(mesh, conditions)).collect();
-            let faces = of_faces.into_iter().map(|(face, k)| (face_key(face), k));
-            let kept = faces.filter(|(_, k)| is_symmetry[*k]);
-            all.faces.extend(kept.map(|(face, k)| (face, all.planes.len() + k)));
-            all.planes.extend(planes);
+            all.add(mesh, mesh.topology().surface(name)?, conditions);
         }
         Ok(all)
+    }
+
+    /// Adds the planes of a surface, of one that is curved those beside its round faces.
+    fn add(&mut self, mesh: &Mesh, surface: &[[NodeId; 3]], conditions: &HashMap<[NodeId; 3], Condition>) {
+        let keys: Vec<[NodeId; 3]> = surface.iter().map(|face| face_key(*face)).collect();
+        let flat = flat_parts(mesh, keys.iter().copied(), conditions);
+        let beside_round = || {
+            let round = round_faces(mesh);
+            flat_parts(mesh, keys.iter().copied().filter(|face| !round.contains(face)), conditions)
+        };
+        let Some((planes, of_faces)) = flat.or_else(beside_round) else { return };
+        let is_symmetry: Vec<bool> = planes.iter().map(|plane| plane.is_symmetry(mesh, conditions)).collect();
+        let kept = of_faces.into_iter().filter(|(_, k)| is_symmetry[*k]);
+        self.faces.extend(kept.map(|(face, k)| (face, self.planes.len() + k)));
+        self.planes.extend(planes);
     }
 
     /// Orthonormal directions in which a mean of `B` over some elements and their images has nothing: across flux-parallel planes in
@@ -85,20 +88,20 @@ impl SymmetryPlanes {
     }
 }
 
-/// The faces of a surface that go on in another plane without a sharp edge.
-fn round_faces(mesh: &Mesh, surface: &[[NodeId; 3]]) -> HashSet<[NodeId; 3]> {
-    let normal = |face: &[NodeId; 3]| unit(area_vector(face.map(|node| mesh.point(node))));
-    let mut at_edges: HashMap<[NodeId; 2], Vec<[NodeId; 3]>> = HashMap::new();
-    for face in surface {
-        triangle_edges(*face).into_iter().for_each(|edge| at_edges.entry(edge).or_default().push(*face));
+/// The outer faces that go on in another plane without a sharp edge, by their keys.
+fn round_faces(mesh: &Mesh) -> HashSet<[NodeId; 3]> {
+    let mut at_edges: HashMap<[NodeId; 2], Vec<([NodeId; 3], Point)>> = HashMap::new();
+    for facet in mesh.topology().facets().iter().filter(|facet| facet.outside.is_none()) {
+        let normal = unit(area_vector(facet.nodes.map(|node| mesh.point(node))));
+        for edge in triangle_edges(facet.nodes) {
+            at_edges.entry(edge).or_default().push((face_key(facet.nodes), normal));
+        }
     }
+    let turns = SMOOTH..1.0 - 0.5 * ROUNDING * ROUNDING;
     let mut round = HashSet::new();
     for faces in at_edges.into_values() {
-        let turns = |face: &[NodeId; 3]| {
-            let cosines = faces.iter().map(|other| dot(normal(face), normal(other)));
-            cosines.into_iter().any(|cosine| (SMOOTH..1.0 - ROUNDING * ROUNDING).contains(&cosine))
-        };
-        round.extend(faces.iter().filter(|face| turns(face)).copied());
+        let goes_on = |normal: &Point| faces.iter().any(|(_, other)| turns.contains(&dot(*normal, *other)));
+        round.extend(faces.iter().filter(|(_, normal)| goes_on(normal)).map(|(face, _)| *face));
     }
     round
 }
@@ -133,8 +136,8 @@ fn flat_parts(
 mod tests {
     use std::sync::Arc;
 
-    use fluxmorph_geometry::RegionId;
     use fluxmorph_geometry::generate::Grid;
+    use fluxmorph_geometry::{Facet, RegionId};
 
     use super::super::plane::conditions;
     use super::*;
@@ -155,6 +158,37 @@ mod tests {
         let conditions = conditions(mesh.topology(), &boundaries).expect("sides of the grid");
         let planes = SymmetryPlanes::new(&mesh, &boundaries, &conditions).expect("sides of the grid");
         planes.odd_directions(mesh.topology(), cell.into_iter())
+    }
+
+    /// A quarter of a cylinder whose faces are one surface, oriented at random, as files may have them.
+    #[test]
+    fn planes_are_found_in_a_surface_that_is_round_elsewhere() {
+        let line = || (0..=4).map(f64::from).collect::<Vec<_>>();
+        let grid = Grid::new("grid", [line(), line(), line()]).expect("ascending lines");
+        let corner = |x: Point| RegionId(u32::from(x.iter().all(|c| *c < 1.0)));
+        let topology = grid.topology(&["rest", "corner"], corner).expect("a grid conforms");
+        let round = |[x, y, z]: Point| {
+            let by = if x.max(y) > 0.0 { x.max(y) / x.hypot(y) } else { 1.0 };
+            [by * x, by * y, z]
+        };
+        let points = grid.points().into_iter().map(round).collect();
+        let mesh = Mesh::new(Arc::new(topology), points).expect("cells have a volume");
+        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+        let turned = |(k, facet): (usize, &Facet)| {
+            let [a, b, c] = facet.nodes;
+            if k % 3 == 0 { [a, c, b] } else { [a, b, c] }
+        };
+        let surface: Vec<[NodeId; 3]> = outer.enumerate().map(turned).collect();
+        let conditions = surface.iter().map(|face| (face_key(*face), Condition::FluxParallel)).collect();
+        let mut planes = SymmetryPlanes::default();
+        planes.add(&mesh, &surface, &conditions);
+        let reached = |region| {
+            let elements = mesh.topology().elements_of(RegionId(region));
+            planes.odd_directions(mesh.topology(), elements.into_iter()).len()
+        };
+        // The planes x, y and z = 0; of all the mesh also the opposite end, and no round face.
+        assert_eq!([reached(1), reached(0)], [3, 3]);
+        assert_eq!(planes.faces.len(), 4 * 2 * 4 * 4, "{:?}", planes.planes);
     }
 
     #[test]
