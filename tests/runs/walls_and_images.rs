@@ -323,3 +323,31 @@ fn a_device_without_a_mean_is_named() {
     };
     assert!(said("objective.compare=\"vector\"") && !said("objective.compare=\"modulus\""));
 }
+
+/// Behind the surface of a closed iron shell there is no field; of 1 mT around it 5.17 µT come through four skin depths.
+#[test]
+fn what_passes_through_a_closed_shell_is_said_of_the_probe_inside() {
+    let home = folder();
+    let out = home.path().join("shell");
+    let shell = set(&[
+        "mesh.sphere.inner_radius=\"44.2 mm\"",
+        "mesh.sphere.skin=[]",
+        "mesh.sphere.wall_layers=1",
+        "analysis.order=1",
+        "materials.metal.relative_permeability=500",
+        "materials.metal.conductivity=\"5e6 S/m\"",
+        "regions.sphere.model=\"impedance\"",
+        "boundaries.uniform_field={surfaces = [\"outer\"], b = [0, 0, \"1 mT\"]}",
+    ]);
+    let config = repository("configs/sphere.toml");
+    finish(command(&[&"solve", &config, &"--out", &out]).args(shell)).exits_with(0);
+    let warnings = read_json(&out.join("result.json"))["warnings"].clone();
+    let said: Vec<&str> = warnings.as_array().into_iter().flatten().filter_map(Value::as_str).collect();
+    let said: Vec<&&str> = said.iter().filter(|text| text.contains("passes through `sphere`")).collect();
+    assert!(
+        said.len() == 1 && said[0].starts_with("B at the probe `centre` at (0.000, 0.000, 0.000) mm is 0 T")
+    );
+    let (_, about) = said[0].split_once("and about ").expect("an estimate");
+    let about: f64 = about.split(' ').next().and_then(|text| text.parse().ok()).expect("a number");
+    assert!((2e-6..1e-5).contains(&about), "{about} T for 5.17e-6");
+}
