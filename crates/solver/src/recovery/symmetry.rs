@@ -10,7 +10,7 @@ use fluxmorph_geometry::curved::SMOOTH;
 use fluxmorph_geometry::directions::{extend, tangents, unit};
 use fluxmorph_geometry::tet4::{FACES, Point, area_vector, dot};
 use fluxmorph_geometry::topology::{face_key, triangle_edges};
-use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
+use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
 
 use super::plane::{Condition, Plane, ROUNDING};
 use crate::boundary::Boundary;
@@ -88,22 +88,30 @@ impl SymmetryPlanes {
     }
 }
 
-/// The outer faces that go on in another plane without a sharp edge, by their keys.
+/// The outer faces that go on in another plane without a sharp edge, with all that lie in one plane with such a face and are joined
+/// to it; by their keys.
 fn round_faces(mesh: &Mesh) -> HashSet<[NodeId; 3]> {
-    let mut at_edges: HashMap<[NodeId; 2], Vec<([NodeId; 3], Point)>> = HashMap::new();
-    for facet in mesh.topology().facets().iter().filter(|facet| facet.outside.is_none()) {
-        let normal = unit(area_vector(facet.nodes.map(|node| mesh.point(node))));
-        for edge in triangle_edges(facet.nodes) {
-            at_edges.entry(edge).or_default().push((face_key(facet.nodes), normal));
-        }
+    let outer: Vec<&Facet> =
+        mesh.topology().facets().iter().filter(|facet| facet.outside.is_none()).collect();
+    let normals: Vec<Point> =
+        outer.iter().map(|facet| unit(area_vector(facet.nodes.map(|node| mesh.point(node))))).collect();
+    let mut at_edges: HashMap<[NodeId; 2], Vec<usize>> = HashMap::new();
+    for (k, facet) in outer.iter().enumerate() {
+        triangle_edges(facet.nodes).into_iter().for_each(|edge| at_edges.entry(edge).or_default().push(k));
     }
-    let turns = SMOOTH..1.0 - 0.5 * ROUNDING * ROUNDING;
-    let mut round = HashSet::new();
-    for faces in at_edges.into_values() {
-        let goes_on = |normal: &Point| faces.iter().any(|(_, other)| turns.contains(&dot(*normal, *other)));
-        round.extend(faces.iter().filter(|(_, normal)| goes_on(normal)).map(|(face, _)| *face));
+    let beside = |k: usize| {
+        let faces = triangle_edges(outer[k].nodes).map(|edge| &at_edges[&edge]);
+        faces.into_iter().flatten().copied().filter(move |other| *other != k)
+    };
+    let cosine = |k: usize, other: usize| dot(normals[k], normals[other]);
+    let flat = 1.0 - 0.5 * ROUNDING * ROUNDING;
+    let is_round = |k: &usize| beside(*k).any(|other| (SMOOTH..flat).contains(&cosine(*k, other)));
+    let mut open: Vec<usize> = (0..outer.len()).filter(is_round).collect();
+    let mut round: HashSet<usize> = open.iter().copied().collect();
+    while let Some(k) = open.pop() {
+        open.extend(beside(k).filter(|other| cosine(k, *other) >= flat && round.insert(*other)));
     }
-    round
+    round.into_iter().map(|k| face_key(outer[k].nodes)).collect()
 }
 
 /// A surface's planes, and its faces with the number of the plane of each.
@@ -136,8 +144,8 @@ fn flat_parts(
 mod tests {
     use std::sync::Arc;
 
+    use fluxmorph_geometry::RegionId;
     use fluxmorph_geometry::generate::Grid;
-    use fluxmorph_geometry::{Facet, RegionId};
 
     use super::super::plane::conditions;
     use super::*;
