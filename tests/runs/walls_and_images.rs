@@ -1,6 +1,7 @@
 //! What lies behind the outer faces of a mesh: walls that cut a field off, and images of what symmetry planes cut.
 
 use std::f64::consts::FRAC_1_SQRT_2;
+use std::path::Path;
 use std::sync::Arc;
 
 use fluxmorph_geometry::generate::Grid;
@@ -14,6 +15,12 @@ use crate::support::folder::{number, read_json, read_text};
 use crate::support::program::{command, finish, folder};
 use crate::support::shield::quick;
 use crate::support::{changed, repository};
+
+/// Whether `check` warns of something with some overrides.
+fn warns_of(config: &Path, overrides: &[&str], text: &str) -> bool {
+    let json = finish(command(&[&"check", &config, &"--json"]).args(set(overrides))).exits_with(0).json();
+    texts(&json["warnings"]).contains(text)
+}
 
 /// The wall beside the coil is a wall, although an element that the coil meets reaches it.
 #[test]
@@ -178,9 +185,8 @@ fn a_side_without_condition_that_cuts_a_magnet_is_named() {
         let path = home.path().join("magnet.toml");
         let conditions = format!("flux_parallel = [{planes}]\nflux_normal = [\"z_min\"]");
         std::fs::write(&path, format!("{before}{conditions}\n\n{after}")).expect("written");
-        let magnet = set(&["analysis.frequency=0", "regions.sphere.remanence=[0, 1, 1]"]);
-        let json = finish(command(&[&"check", &path, &"--json"]).args(magnet)).exits_with(0).json();
-        texts(&json["warnings"]).contains("is cut by an outer side without condition, at which")
+        let magnet = ["analysis.frequency=0", "regions.sphere.remanence=[0, 1, 1]"];
+        warns_of(&path, &magnet, "is cut by an outer side without condition, at which")
     };
     assert!(said("\"y_min\", \"outer\"") && !said("\"x_min\", \"y_min\""));
 }
@@ -197,8 +203,7 @@ fn the_homogeneity_of_a_component_that_images_change_is_asked_about() {
         let text = changed(&pole, &[("kind = \"target_field\"", &objective), (target, "")]);
         let path = home.path().join("pole.toml");
         std::fs::write(&path, text).expect("written");
-        let json = finish(&mut command(&[&"check", &path, &"--json"])).exits_with(0).json();
-        texts(&json["warnings"]).contains("behind `x_min` the images of `observation` have another component")
+        warns_of(&path, &[], "behind `x_min` the images of `observation` have another component")
     };
     assert!(said("[1, 0, 1]") && said("[1, 0, 0]") && !said("[0, 0, 1]"));
 }
@@ -317,9 +322,7 @@ fn a_device_without_a_mean_is_named() {
     ];
     std::fs::write(&config, changed(OVER_A_PLANE, &planes)).expect("written");
     let said = |compare: &str| {
-        let compare = set(&[compare]);
-        let json = finish(command(&[&"check", &config, &"--json"]).args(compare)).exits_with(0).json();
-        texts(&json["warnings"]).contains("leave the mean of B over the whole device no direction")
+        warns_of(&config, &[compare], "leave the mean of B over the whole device no direction")
     };
     assert!(said("objective.compare=\"vector\"") && !said("objective.compare=\"modulus\""));
 }

@@ -2,7 +2,7 @@
 
 use fluxmorph_solver::Material;
 
-use crate::config::{Coil, CoilShape, Config, RegionModel};
+use crate::config::{Coil, CoilShape, Config};
 
 /// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron; the skin audit and the
 /// field have that of the curve.
@@ -35,6 +35,5 @@ pub(super) fn density(config: &Config, region: &str) -> Option<f64> {
 
 /// Whether a region is air to the field: of no other material, no magnet, and none that a surface stands for.
 pub(crate) fn is_air(config: &Config, region: &str) -> bool {
-    let is_meshed = config.regions.get(region).is_none_or(|own| own.model == RegionModel::Volume);
-    material(config, region) == Material::AIR && !is_magnet(config, region) && is_meshed
+    material(config, region) == Material::AIR && !is_magnet(config, region) && config.is_meshed(region)
 }

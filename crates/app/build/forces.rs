@@ -32,9 +32,11 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
         is_iron(name) || is_magnet(config, name) || conducts || is_wound(config, name)
     };
     let (name, regions) = (&body.name, body.regions.join("`, `"));
-    let is_own = |e: ElementId| body.regions.iter().any(|name| name == topology.region_name_at(e));
-    let holds_a_coil =
-        || windings(coils).any(|(_, winding)| place_of_current(mesh, winding, is_own).is_some());
+    let is_own = |e: &ElementId| body.regions.iter().any(|name| name == topology.region_name_at(*e));
+    let holds_a_coil = || {
+        windings(coils)
+            .any(|(_, winding)| place_of_current(mesh, winding, topology.elements().filter(is_own)).is_some())
+    };
     if !body.regions.iter().any(acts) && !holds_a_coil() {
         return Some(format!(
             "no force acts on the body `{name}`: nothing in `{regions}` is magnetic or carries a current, and what is computed is \

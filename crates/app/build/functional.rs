@@ -231,26 +231,26 @@ fn regions_of(body: &config::ForceBody, mesh: &Mesh) -> Result<Vec<RegionId>, Me
 
 /// Vectors compared with their mean where planes of symmetry leave the whole device none.
 pub(super) fn mean_warnings(
-    config: &Config,
-    meshes: [&Mesh; 2],
-    states: &[FieldModel],
-) -> Result<Vec<String>, Error> {
-    let mut warnings = Vec::new();
-    for (_, own) in functionals(config).into_iter().filter(|(_, own)| own.kind == ObjectiveKind::Homogeneity)
-    {
-        let term = term(config, own, meshes, states)?;
-        if let Functional::Observation(observation) = &term.functional
-            && observation.has_no_mean(&states[0])
-        {
-            warnings.push(format!(
+    objective: Option<&WeightedSum>,
+    constraints: &[Constraint],
+    model: &FieldModel,
+) -> BTreeSet<String> {
+    let constrained = constraints.iter().filter_map(|own| match &own.quantity {
+        Quantity::Field(term) => Some(&**term),
+        Quantity::Volume(_) | Quantity::Thickness { .. } => None,
+    });
+    let warning = |term: &Term| {
+        let Functional::Observation(observation) = &term.functional else { return None };
+        observation.has_no_mean(model).then(|| {
+            format!(
                 "the planes of symmetry at which `{}` ends leave the mean of B over the whole device no direction: its homogeneity is \
                  relative to the mean over the part that is meshed, which the device does not have. Take compare = \"modulus\", or a \
                  component",
-                own.region.as_deref().unwrap_or_default()
-            ));
-        }
-    }
-    Ok(warnings)
+                term.label.region.as_deref().unwrap_or_default()
+            )
+        })
+    };
+    objective.into_iter().flat_map(|own| &own.terms).chain(constrained).filter_map(warning).collect()
 }
 
 /// Elements that must not move, for they are observed.

@@ -230,7 +230,6 @@ fn problem_on(
         warnings.push(unexcited(config, source, mode)?);
     }
     let objective = functional::objective(config, [&full_mesh, &mesh], &states)?;
-    warnings.extend(functional::mean_warnings(config, [&full_mesh, &mesh], &states)?);
     let shape = match (&design, body) {
         (Some(inputs), Some(body)) => {
             progress.stage(Stage::Elasticity);
@@ -246,6 +245,7 @@ fn problem_on(
     };
     progress.stage(Stage::Other);
     let constraints = functional::constraints(config, source, [&full_mesh, &mesh], &states, shape.as_ref())?;
+    warnings.extend(functional::mean_warnings(objective.as_ref(), &constraints, &states[0]));
     if shape.is_none() && constraints.len() < config.constraints.len() {
         warnings
             .push("[[constraints]] on a body have no meaning without [design]: they are left out".to_owned());

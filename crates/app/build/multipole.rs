@@ -113,7 +113,8 @@ pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) 
     let (mesh, states) = (problem.original(), problem.states());
     let mut sink = DiagnosticSink::new(config, source, Vec::new());
     for (k, set) in config.multipoles.iter().enumerate() {
-        if let Some(axis) = Planes::of(config, set, (&states[0], mesh)).divided {
+        let planes = Planes::of(config, set, (&states[0], mesh));
+        if let Some(axis) = planes.divided {
             let message = format!(
                 "the expansion `{}` ends at a plane across {} that is flux-parallel and flux-normal within its radius",
                 set.name,
@@ -125,7 +126,7 @@ pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) 
             );
             continue;
         }
-        let Some((message, what)) = disturbance(config, set, problem, mesh)? else {
+        let Some((message, what)) = disturbance(set, (problem, mesh), &planes)? else {
             sink.take(multipoles(config, set, mesh, &states[0]))?;
             continue;
         };
@@ -148,14 +149,12 @@ pub(super) fn check_all(config: &Config, source: &SourceMap, problem: &Problem) 
 
 /// Matter in an expansion, in words, and what it is.
 fn disturbance(
-    config: &Config,
     set: &MultipoleSet,
-    problem: &Problem,
-    mesh: &Mesh,
+    (problem, mesh): (&Problem, &Mesh),
+    planes: &Planes,
 ) -> Result<Option<(String, &'static str)>, Error> {
-    let planes = Planes::of(config, set, (&problem.states()[0], mesh)).mirrors;
     let bounds = AxisBox::around(mesh.bounding_box());
-    let disturbed = Multipoles::disturbance(problem.states(), mesh, &expansion(set)?, &planes);
+    let disturbed = Multipoles::disturbance(problem.states(), mesh, &expansion(set)?, &planes.mirrors);
     // Beyond the box of the mesh it is no hole.
     Ok(disturbed.filter(|(place, _)| bounds.contains(*place)).map(|(place, what)| {
         let shape = match set.shape {
@@ -169,7 +168,10 @@ fn disturbance(
 
 /// The expansions into which a design, on its mesh, has brought matter.
 pub(crate) fn warnings(config: &Config, problem: &Problem, mesh: &Mesh) -> Result<Vec<String>, Error> {
-    let of = |set| Ok(disturbance(config, set, problem, mesh)?.map(|(message, _)| message));
+    let of = |set| {
+        let planes = Planes::of(config, set, (&problem.states()[0], mesh));
+        Ok(disturbance(set, (problem, mesh), &planes)?.map(|(message, _)| message))
+    };
     let found: Result<Vec<Option<String>>, Error> = config.multipoles.iter().map(of).collect();
     let advice = "in this design: its terms are not those of sources beside it; keep the surface out of it by bounds of the design, or take \
                   a smaller radius";
@@ -234,11 +236,14 @@ impl Planes {
                 corners.iter().map(|x| (x[axis] - set.center[axis]).abs()).fold(0.0_f64, f64::max)
             };
             let Some(axis) = (0..3).find(|&axis| off(axis) <= OFF_CENTRE * set.radius) else { continue };
-            let kind = match () {
-                () if parallel.contains(&key) => 0,
-                () if normal.contains(&key) => 1,
-                () if replaced.contains(&key) => continue,
-                () => 2,
+            let kind = if parallel.contains(&key) {
+                0
+            } else if normal.contains(&key) {
+                1
+            } else if replaced.contains(&key) {
+                continue;
+            } else {
+                2
             };
             found[axis][kind] |= reaches(&corners, set);
         }

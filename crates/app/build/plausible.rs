@@ -262,11 +262,8 @@ fn overlap_warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<S
             CoilShape::Region(own) => Some((j, mesh.topology().region(&own.region).ok()?)),
             _ => None,
         });
-        let place = |region| {
-            let mut elements = mesh.topology().elements_of(region).into_iter();
-            elements.find_map(|e| winding.wound_place(mesh.vertices(e)))
-        };
-        let met = of_regions.filter_map(|(j, region)| Some(text([*i, j], place(region)?)));
+        let place = |region| place_of_current(mesh, winding, mesh.topology().elements_of(region));
+        let met = of_regions.filter_map(|(j, region)| Some(text([*i, j], place(region)?.1)));
         met.collect::<Vec<String>>()
     };
     let pairs =
@@ -309,14 +306,13 @@ fn flows(winding: &Racetrack, x: &Point) -> bool {
     norm(winding.current_density(*x)) > 0.0
 }
 
-/// Where the current of a winding flows in elements that are asked for.
+/// Where the current of a winding flows in some elements.
 pub(super) fn place_of_current(
     mesh: &Mesh,
     winding: &Racetrack,
-    is_wanted: impl Fn(ElementId) -> bool,
+    elements: impl IntoIterator<Item = ElementId>,
 ) -> Option<(ElementId, Point)> {
-    let mut wanted = mesh.topology().elements().filter(|&e| is_wanted(e));
-    wanted.find_map(|e| winding.wound_place(mesh.vertices(e)).map(|place| (e, place)))
+    elements.into_iter().find_map(|e| winding.wound_place(mesh.vertices(e)).map(|place| (e, place)))
 }
 
 /// What to say of a coil whose current runs along a wall that no flux passes, rarely meant: its mirror image is the opposite one.
@@ -491,6 +487,7 @@ fn matter_in(config: &Config, mesh: &Mesh, winding: &Racetrack) -> Option<(Regio
     };
     let matter: Vec<bool> = topology.region_names().iter().map(is_matter).collect();
     let region = |e: ElementId| topology.region_of()[e.index()];
-    let (e, place) = place_of_current(mesh, winding, |e| matter[region(e).index()])?;
+    let (e, place) =
+        place_of_current(mesh, winding, topology.elements().filter(|e| matter[region(*e).index()]))?;
     Some((region(e), place))
 }

@@ -15,7 +15,7 @@ use fluxmorph_geometry::{Facet, Mesh, Millimetres, NodeId, RegionId, Topology, m
 
 use super::entries::material;
 use super::open;
-use crate::config::{self, Config, Diagnostic, MeshConfig, RegionModel, SourceMap};
+use crate::config::{self, Config, Diagnostic, MeshConfig, SourceMap};
 
 /// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
 const USUAL: [f64; 2] = [1e-3, 30.0];
@@ -61,10 +61,8 @@ pub(super) fn outside(config: &Config, source: &SourceMap, mesh: &Mesh) -> Resul
         |patch: &OpenPatch| patch.faces.iter().all(|&f| named.contains(&face_key(hull.faces()[f].nodes)));
     let (mut outside, mut faults) = (Outside::default(), parts_fault(source, mesh));
     // Faces of a region that its surface replaces are no faces of the field.
-    let is_meshed = |face: &usize| {
-        let region = config.regions.get(mesh.topology().region_name_at(hull.faces()[*face].inside));
-        region.is_none_or(|own| own.model == RegionModel::Volume)
-    };
+    let is_meshed =
+        |face: &usize| config.is_meshed(mesh.topology().region_name_at(hull.faces()[*face].inside));
     for patch in patches.into_iter().filter(|patch| patch.faces.iter().any(is_meshed)) {
         let text = patch_text(&hull, &patch);
         match patch.situation {

@@ -100,12 +100,12 @@ pub(crate) fn check_coils(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), So
         surfaces.push(ConditionedSurface { name, condition, triangles: mesh.topology().surface(name)? });
     }
     // What is tangential is known on a perfect conductor under edge elements, as on a flux-parallel wall.
-    for own in setup.conductors.iter().filter(|own| own.law == SurfaceLaw::Perfect) {
-        if setup.family == ElementFamily::Edge {
-            let (name, triangles) = (&own.name, &own.surface[..]);
-            surfaces.push(ConditionedSurface { name, condition: Condition::FluxParallel, triangles });
-        }
-    }
+    let is_known = |own: &&Conductor| setup.family == ElementFamily::Edge && own.law == SurfaceLaw::Perfect;
+    surfaces.extend(setup.conductors.iter().filter(is_known).map(|own| ConditionedSurface {
+        name: &own.name,
+        condition: Condition::FluxParallel,
+        triangles: &own.surface,
+    }));
     planes::check(mesh, &setup.coils, &surfaces)
 }
 

@@ -22,8 +22,8 @@ pub(super) struct Section<'a> {
     asked: RefCell<Vec<&'static str>>,
     /// The keys that have no use beside the values of others.
     hidden: RefCell<Vec<&'static str>>,
-    /// The keys of earlier versions.
-    former: RefCell<Vec<&'static str>>,
+    /// The keys of which nothing is said: those of earlier versions, and those beside a faulty value.
+    excused: RefCell<Vec<&'static str>>,
     /// Whether nothing is said of unknown keys.
     silent: Cell<bool>,
 }
@@ -32,8 +32,8 @@ impl<'a> Section<'a> {
     /// A table at a key path.
     pub(super) fn new(path: String, table: &'a Table, span: Span, context: &'a Context) -> Self {
         let silent = Cell::new(false);
-        let (asked, hidden, former) = Default::default();
-        Self { path, table, span, context, asked, hidden, former, silent }
+        let (asked, hidden, excused) = Default::default();
+        Self { path, table, span, context, asked, hidden, excused, silent }
     }
 
     /// Key path of the table.
@@ -70,7 +70,7 @@ impl<'a> Section<'a> {
     /// Keys of earlier versions, which have no effect: a notice says so, and why.
     pub(super) fn pass_over(&self, keys: &[(&'static str, &str)]) {
         for (key, why) in keys {
-            self.former.borrow_mut().push(key);
+            self.excused.borrow_mut().push(key);
             if self.has(key) {
                 let notice =
                     format!("`{}` is of an earlier version, and has no effect: {why}", join(&self.path, key));
@@ -92,7 +92,7 @@ impl<'a> Section<'a> {
 
     /// Nothing is said of keys that have a use beside other values: which of these is meant is not known.
     pub(super) fn excuse_hidden(&self) {
-        self.former.borrow_mut().extend(self.hidden.borrow().iter());
+        self.excused.borrow_mut().extend(self.hidden.borrow().iter());
     }
 
     /// The value of a key that is known from here on.

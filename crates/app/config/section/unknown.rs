@@ -15,8 +15,8 @@ impl Section<'_> {
         let mut known: Vec<&str> = self.asked.borrow().clone();
         known.sort_unstable();
         known.dedup();
-        let former = self.former.borrow();
-        for (key, node) in self.written().filter(|(key, _)| !known.contains(key) && !former.contains(key)) {
+        let excused = self.excused.borrow();
+        for (key, node) in self.written().filter(|(key, _)| !known.contains(key) && !excused.contains(key)) {
             let diagnostic = self.unknown(key, node, &known);
             self.context.sink.push(diagnostic);
         }

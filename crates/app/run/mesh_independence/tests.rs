@@ -98,6 +98,8 @@ fn the_same_cells_give_the_same_ratio_whatever_carries_the_shape() {
         let (objective, recorded) =
             verified_in(1, (&config, &source), &shapes, StopReason::ObjectiveConverged, false);
         let found = objective.verification.unwrap_or_else(|| panic!("{:?}", recorded.warnings));
+        // A control grid carries the shape but where every node is a variable, and has the same one on the same cells.
+        assert_eq!(found.deviation.map(|found| found.distance_m < 1e-12), (!on_nodes).then_some(true));
         assert_eq!(objective.verified_ratio, Some(found.ratio));
         // The residual that every linear solution has to reach, twice.
         assert!((found.ratio - expected).abs() < 2e-9 * expected, "{} {expected}", found.ratio);

@@ -29,8 +29,9 @@ use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::{face_key, triangle_edges};
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{Mesh, NodeId};
 
+use super::inside_of_outer_faces;
 use crate::element::triangle::Triangle;
 use crate::element::{Complex3, dot3};
 use crate::fixed_directions::CREASE;
@@ -122,8 +123,7 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
     let of_surfaces = solution.surface_losses(model, mesh).into_iter();
     let losses: HashMap<[NodeId; 3], f64> = of_surfaces.map(|(_, t, loss)| (face_key(t), loss)).collect();
     let outer = || mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-    let inside: HashMap<[NodeId; 3], ElementId> =
-        outer().map(|facet| (face_key(facet.nodes), facet.inside)).collect();
+    let inside = inside_of_outer_faces(mesh);
     let replaced: HashSet<[NodeId; 3]> =
         model.conductors().iter().flat_map(|own| &own.surface).map(|t| face_key(*t)).collect();
     let walls = || outer().map(|facet| facet.nodes).filter(|nodes| !replaced.contains(&face_key(*nodes)));

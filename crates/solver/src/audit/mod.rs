@@ -16,8 +16,11 @@ pub use layers::CoarseLayers;
 pub use nodal::NodalErrors;
 pub use transmission::{Transmission, transmissions};
 
+use std::collections::HashMap;
+
 use fluxmorph_geometry::box_tree::AxisBox;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, dot, norm, sub, volume};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId};
 
 use crate::elements::Order;
@@ -212,6 +215,12 @@ impl ConductorFace {
         let under = sub(centroid(mesh.vertices(self.element)), a);
         if dot(area_vector([a, b, c]), under) > 0.0 { [a, b, c] } else { [a, c, b] }
     }
+}
+
+/// The elements at the outer faces, by the keys of these.
+fn inside_of_outer_faces(mesh: &Mesh) -> HashMap<[NodeId; 3], ElementId> {
+    let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+    outer.map(|facet| (face_key(facet.nodes), facet.inside)).collect()
 }
 
 /// The faces of the regions of a conductor, as one.

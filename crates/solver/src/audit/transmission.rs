@@ -9,16 +9,16 @@
 //! the mean square of the normal component of a uniform field is a third; less before a small one. Walls that stand behind others
 //! are seen, too. So this is about what passes, and tells whether it matters.
 
-use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 
 use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId};
+use fluxmorph_geometry::{Mesh, NodeId};
 use rayon::prelude::*;
 
+use super::inside_of_outer_faces;
 use super::walls::{Wall, walls};
 use crate::element::dot3;
 use crate::model::FieldModel;
@@ -52,9 +52,7 @@ pub fn transmissions(
     solution: &FieldSolution,
     places: &[Point],
 ) -> Vec<Transmission> {
-    let outer = || mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-    let inside: HashMap<[NodeId; 3], ElementId> =
-        outer().map(|facet| (face_key(facet.nodes), facet.inside)).collect();
+    let inside = inside_of_outer_faces(mesh);
     let of = |conductor: &Conductor| {
         let SurfaceLaw::Impedance(material) = conductor.law else { return None };
         let skin_depth = material.skin_depth(model.angular_frequency())?;

@@ -24,7 +24,7 @@ pub(super) fn walls(corners: &[[Point; 3]], most: f64) -> Vec<Option<Wall>> {
         let meets = |k: usize| {
             let met = hit(origin, direction, &corners[k])?;
             // The face opposite looks towards the ray.
-            let is_wall = dot(met.normal, direction) < 0.0 && (0.0..=most).contains(&met.distance);
+            let is_wall = dot(met.normal, direction) < 0.0 && met.distance <= most;
             is_wall.then_some(Wall { thickness: met.distance, opposite: k })
         };
         let met = tree.hits(origin, direction).into_iter().filter_map(meets);

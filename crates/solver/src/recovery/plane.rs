@@ -16,7 +16,7 @@ pub(super) const ROUNDING: f64 = 1e-3;
 
 /// What holds on a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Condition {
+pub(super) enum Condition {
     FluxParallel,
     FluxNormal,
     /// Anything else: `A` is given, is a gradient along the face, or free.

@@ -4,6 +4,7 @@
 //! of another condition lies in. One of natural faces alone is none, though flux crosses them at right angles. A far wall that a region
 //! reaches counts as one: the field there is that of a device with images beyond it.
 
+use std::cell::OnceCell;
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use fluxmorph_geometry::curved::SMOOTH;
@@ -41,18 +42,25 @@ impl SymmetryPlanes {
         conditions: &HashMap<[NodeId; 3], Condition>,
     ) -> Result<Self, MeshError> {
         let mut all = Self::default();
+        let round = OnceCell::new();
         for (name, _) in boundaries {
-            all.add(mesh, mesh.topology().surface(name)?, conditions);
+            all.add(mesh, mesh.topology().surface(name)?, conditions, &round);
         }
         Ok(all)
     }
 
-    /// Adds the planes of a surface, of one that is curved those beside its round faces.
-    fn add(&mut self, mesh: &Mesh, surface: &[[NodeId; 3]], conditions: &HashMap<[NodeId; 3], Condition>) {
+    /// Adds the planes of a surface, of one that is curved those beside the `round` faces, which are found once.
+    fn add(
+        &mut self,
+        mesh: &Mesh,
+        surface: &[[NodeId; 3]],
+        conditions: &HashMap<[NodeId; 3], Condition>,
+        round: &OnceCell<HashSet<[NodeId; 3]>>,
+    ) {
         let keys: Vec<[NodeId; 3]> = surface.iter().map(|face| face_key(*face)).collect();
         let flat = flat_parts(mesh, keys.iter().copied(), conditions);
         let beside_round = || {
-            let round = round_faces(mesh);
+            let round = round.get_or_init(|| round_faces(mesh));
             flat_parts(mesh, keys.iter().copied().filter(|face| !round.contains(face)), conditions)
         };
         let Some((planes, of_faces)) = flat.or_else(beside_round) else { return };
@@ -189,7 +197,7 @@ mod tests {
         let surface: Vec<[NodeId; 3]> = outer.enumerate().map(turned).collect();
         let conditions = surface.iter().map(|face| (face_key(*face), Condition::FluxParallel)).collect();
         let mut planes = SymmetryPlanes::default();
-        planes.add(&mesh, &surface, &conditions);
+        planes.add(&mesh, &surface, &conditions, &OnceCell::new());
         let reached = |region| {
             let elements = mesh.topology().elements_of(RegionId(region));
             planes.odd_directions(mesh.topology(), elements.into_iter()).len()
