@@ -4,7 +4,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Child, Output};
 
-use crate::launch::{COARSE, assert_same, completed, fluxmorph, on, result};
+use crate::launch::{COARSE, assert_same, completed, fluxmorph, on, records, result};
 use crate::support::folder::rows;
 use crate::support::program::{folder, send, wait_until};
 
@@ -87,4 +87,21 @@ fn an_initial_design_that_the_mesh_does_not_carry_is_refused_on_ranks_too() {
         assert_eq!(*code, Some(3), "{said}");
         assert!(said.contains("of the initial design") && said.contains("design.initial"), "{said}");
     }
+}
+
+/// One process answers designs that the mesh carries no farther than known ones without an evaluation, and writes no record of them.
+#[test]
+fn a_run_of_one_process_with_such_designs_goes_on_on_ranks() {
+    let folder = folder();
+    let out = folder.path().join("out");
+    let far = [
+        "design.upper=\"300 mm\"",
+        "output.verify_refinement=0",
+        "output.fields=\"none\"",
+        "optimizer.max_evaluations=20",
+    ];
+    completed(&mut on(0, "run", "shield_quick.toml", &out, &far));
+    let before = records(&out);
+    completed(fluxmorph(2).arg("resume").arg(&out).args(["--max-evaluations", "22"]));
+    assert_eq!((before.len(), records(&out).len()), (20, 22));
 }

@@ -269,6 +269,36 @@ fn a_thickness_keeps_within_both_of_its_bounds() {
     assert!(run.best.violation == 0.0 && least >= 7e-3 - 1e-9 && most <= 20e-3 + 1e-9 && best.ratio < 1.0);
 }
 
+/// One function of all places led every method astray: F/F0 was .87 after sixty evaluations.
+#[test]
+fn a_thickness_costs_a_search_no_more_than_bounds_of_the_variables() {
+    let bounded = ("lower = \"-5 mm\"", "lower = \"-3.94 mm\"");
+    let limited = ("[design]", "[[constraints]]\nkind = \"thickness\"\nminimum = \"6 mm\"\n[design]");
+    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
+        let few = |s| Optimizer { algorithm, max_evaluations: 12, ..s };
+        let [limited, bounded] = [limited, bounded].map(|change| {
+            let (run, rows) = with("shield_quick.toml", &[change], few);
+            (run.best.objective / run.initial, rows[run.best.evaluation].min_thickness_m.expect("a plate"))
+        });
+        println!("{algorithm:?}: {limited:?} {bounded:?}");
+        assert!((limited.0 / bounded.0 - 1.0).abs() < 1e-9 && limited.0 < 0.65, "{limited:?} {bounded:?}");
+        assert!(limited.1 >= 6.06e-3 - 1e-12, "{limited:?}");
+    }
+    // Where several variables move a node the limits are constraints of their own.
+    let grid = |text: &str| format!("{text}\ngrid = [7, 13]");
+    let [limited, bounded] = [limited, bounded].map(|(from, to)| {
+        let to = if from == "[design]" { grid(to) } else { to.to_owned() };
+        let changes = [(from, to.as_str()), ("[design]", &grid("[design]"))];
+        let few = |s| Optimizer { max_evaluations: 12, ..s };
+        let count = if from == "[design]" { 1 } else { 2 };
+        let (run, _) = with("shield_quick.toml", &changes[..count], few);
+        assert_eq!(run.best.violation, 0.0);
+        run.best.objective / run.initial
+    });
+    println!("grid: {limited} {bounded}");
+    assert!(limited < 1.02 * bounded, "{limited} {bounded}");
+}
+
 #[test]
 fn a_field_may_be_limited_relative_to_the_initial_design() {
     let limit = "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper_ratio = 1.01\n[design]";

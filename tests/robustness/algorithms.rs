@@ -103,7 +103,7 @@ fn minimised(algorithm: Algorithm, journal: Option<&[u8]>) -> (Vec<u8>, usize) {
             value: record.row.objective,
             gradient: record.gradient,
             constraints: record.constraints,
-            members: Vec::new(),
+            ..Sample::default()
         })
     });
     let bytes = disk.files(Path::new("/run")).remove(Path::new("journal.jsonl")).expect("a journal");

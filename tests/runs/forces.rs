@@ -37,6 +37,25 @@ fn a_force_beside_the_surface_of_a_conductor_is_refused() {
     assert!(refused.contains(said) && refused.contains("a layer of air"), "{refused}");
 }
 
+/// Also of a body whose elements are not there, as the coil feels it.
+#[test]
+fn a_force_on_a_conductor_that_its_surface_replaces_is_reported() {
+    let home = folder();
+    let solved = |name: &str, sets: &[&str]| {
+        let out = home.path().join(name);
+        let mut solve = command(&[&"solve", &quick(), &"--out", &out, &"--json"]);
+        finish(solve.args(set(sets))).exits_with(0).json()
+    };
+    let forces = "forces=[{name=\"plate\",regions=[\"plate\"]}]";
+    let result = solved("surface", &[forces]);
+    let force = |result: &serde_json::Value| result["forces"][0]["force_n"][2].as_f64().expect("a number");
+    let meshed = solved("meshed", &[forces, "regions.plate.model=\"volume\"", "analysis.elements=\"edge\""]);
+    let surface = solved("edge", &[forces, "analysis.elements=\"edge\""]);
+    assert!((force(&result) / force(&surface) - 1.0).abs() < 0.1, "{result} {surface}");
+    assert!((force(&surface) / force(&meshed) - 1.0).abs() < 0.1, "{surface} {meshed}");
+    assert!(!texts(&result["warnings"]).contains("no force acts"), "{result}");
+}
+
 #[test]
 fn a_force_across_a_plane_that_cuts_its_body_is_asked_about() {
     let along = |direction: &str| {

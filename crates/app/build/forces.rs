@@ -1,5 +1,6 @@
 //! Bodies whose force or torque means little: of air, that touch iron outside of them, and cut by an outer face.
 
+use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId, millimetres};
@@ -9,7 +10,10 @@ use super::entries::{is_magnet, is_wound, material};
 use super::plausible::{INCLINED, place_of_current, windings};
 use super::references::functionals;
 use super::soundness::faces_of;
-use crate::config::{Config, ForceBody, ObjectiveKind};
+use crate::config::{Config, ForceBody, ObjectiveKind, RegionModel};
+
+/// Cosine of the angle (one degree) between normals of planes that count as parallel.
+const ONE_DIRECTION: f64 = 0.9998;
 
 /// What is to be said of all bodies; `coils` are those of the configuration.
 pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
@@ -28,7 +32,8 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
     let topology = mesh.topology();
     let is_iron = |name: &str| material(config, name).relative_permeability != 1.0;
     let acts = |name: &String| {
-        let conducts = config.alternates() && material(config, name).conductivity > 0.0;
+        let is_perfect = config.regions.get(name).is_some_and(|own| own.model == RegionModel::Perfect);
+        let conducts = is_perfect || config.alternates() && material(config, name).conductivity > 0.0;
         is_iron(name) || is_magnet(config, name) || conducts || is_wound(config, name)
     };
     let (name, regions) = (&body.name, body.regions.join("`, `"));
@@ -59,12 +64,27 @@ fn cut_winding_warning(config: &Config, mesh: &Mesh, body: &ForceBody) -> Option
         return None;
     }
     let cuts = cutting_surfaces(config, mesh, body, |_| true)?;
+    if is_straight_between_planes(mesh, body) {
+        return None;
+    }
     let (cuts, verb) = (cuts.join(" and "), if cuts.len() == 1 { "cuts" } else { "cut" });
     Some(format!(
         "{cuts} {verb} the winding `{}`: its force across that, as the axial one of half a winding, is the one on the free faces of the \
          meshed part, without the stress in the cut, and not the J × B of its turns; mesh the whole winding for it",
         body.name
     ))
+}
+
+/// Whether a body is cut by parallel planes on opposite sides alone, as a bar in a slab: its current goes from one to the other, and
+/// feels no force across them.
+fn is_straight_between_planes(mesh: &Mesh, body: &ForceBody) -> bool {
+    let topology = mesh.topology();
+    let regions = body.regions.iter().filter_map(|name| topology.region(name).ok());
+    let normal = |face: [NodeId; 3]| unit(area_vector(face.map(|node| mesh.point(node))));
+    let normals: Vec<Point> = regions.flat_map(|region| topology.outer_faces(region)).map(normal).collect();
+    let Some(first) = normals.first() else { return false };
+    let along = || normals.iter().map(|own| dot(*own, *first));
+    along().all(|own| own.abs() > ONE_DIRECTION) && along().any(|own| own < 0.0)
 }
 
 /// The surfaces that cut a body, in words: those with a condition before one without; of faces that count.

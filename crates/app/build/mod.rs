@@ -65,7 +65,8 @@ use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_optimizer::constraint::Constraint;
 use fluxmorph_optimizer::design::DesignSurface;
 use fluxmorph_optimizer::problem::{Cut, Problem, Progress, Shape, Stage};
-use fluxmorph_solver::FieldModel;
+use fluxmorph_remesh::RemeshError;
+use fluxmorph_solver::{FieldModel, SolverError};
 
 use self::curves::Curves;
 use self::locate_error::DiagnosticSink;
@@ -132,9 +133,21 @@ pub fn set_up_watched(
         config.optimisation(source)?;
     }
     progress.stage(Stage::Mesh);
-    let mut setup = mesh::build(config, source)
-        .and_then(|built| problem_on(built, config, source, mode, group, progress))
-        .map_err(|error| locate_error::attribute_error(error, config, source))?;
+    let mut set_up = |group| {
+        mesh::build(config, source)
+            .and_then(|built| problem_on(built, config, source, mode, group, progress))
+            .map_err(|error| locate_error::attribute_error(error, config, source))
+    };
+    let mut setup = set_up(group).map_err(|error| match error {
+        // Another rank has met a fault of the configuration before this one: alone it is met, and located.
+        Error::Optimizer(
+            OptimizerError::Remesh(RemeshError::Rank(_)) | OptimizerError::Solver(SolverError::Rank(_)),
+        ) => match set_up(None) {
+            Err(fault @ Error::Config(_)) => fault,
+            _ => error,
+        },
+        other => other,
+    })?;
     if !(mode == Mode::Inspection && config.morph.is_some()) {
         multipole::check_all(config, source, &setup.problem)?;
     }

@@ -5,7 +5,7 @@ use fluxmorph_optimizer::body::BodyForce;
 use super::states::State;
 use super::styles::{Styles, styled};
 use super::{Started, probes};
-use crate::config::{Constraint, Limit, Objective, ValueBound, each_once};
+use crate::config::{Constraint, Limit, Objective, each_once};
 use crate::files::{
     Accuracy, Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT,
     MultipoleResult, ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, StateErrors, Verdict,
@@ -59,9 +59,7 @@ impl Named {
 
     /// Whether the bound of a constraint is a share of the initial value.
     fn has_shared_bound(&self, constraint: &str) -> bool {
-        let is_share =
-            |bound: &ValueBound| matches!(bound, ValueBound::AtMostRatio(_) | ValueBound::AtLeastRatio(_));
-        matches!(self.limit_of(constraint), Some(Limit::Functional { bound, .. }) if is_share(bound))
+        self.limit_of(constraint).is_some_and(Limit::is_share_of_initial)
     }
 
     /// The unit of a constraint, behind a value.

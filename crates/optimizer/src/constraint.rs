@@ -39,6 +39,9 @@ pub enum Quantity {
     },
 }
 
+/// A bound that differs from what is bounded by this factor is one of another unit, or decides nothing.
+const FAR: f64 = 1e3;
+
 /// How a value is limited.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Limit {
@@ -79,6 +82,17 @@ impl Quantity {
 }
 
 impl Constraint {
+    /// Limits that a method is shown at a design in its place, each `c ≤ 0` of order one with its derivatives, as [`ThicknessBound::limits`];
+    /// `None` where it is shown itself.
+    ///
+    /// [`ThicknessBound::limits`]: geometric::ThicknessBound::limits
+    pub fn limits(&self, p: &[f64]) -> Option<Vec<(f64, Vec<f64>)>> {
+        match &self.quantity {
+            Quantity::Thickness { measure, .. } => measure.limits(p),
+            Quantity::Field(_) | Quantity::Volume(_) => None,
+        }
+    }
+
     /// Value and gradient of a quantity of the shape alone; `None` for one of the field.
     ///
     /// # Errors
@@ -119,6 +133,26 @@ impl Constraint {
         let sign = if matches!(self.limit, Limit::AtLeast(_) | Limit::AtLeastRatio(_)) { -1.0 } else { 1.0 };
         Ok(Bound { value, slope: sign / scale })
     }
+
+    /// What is to be said of a bound that is far from the value of the initial design, on its other side or in size.
+    pub fn far_bound(&self, initial: f64) -> Option<String> {
+        let (Limit::AtMost(value) | Limit::AtLeast(value)) = self.limit else { return None };
+        let share = value / initial;
+        let is_other_side =
+            share < 0.0 && value.is_sign_negative() == matches!(self.limit, Limit::AtLeast(_));
+        let how = match share.abs() {
+            far if !far.is_finite() || far == 0.0 => return None,
+            _ if is_other_side => "of the other sign and kept by all of this sign".to_owned(),
+            far if far >= FAR => format!("{far:.0e} times as much"),
+            far if far <= 1.0 / FAR => format!("{far:.0e} of that"),
+            _ => return None,
+        };
+        Some(format!(
+            "`{}` is {initial:.4e} at the initial design, in SI, and its bound {value:.4e} is {how}: see whether its unit and its \
+             sign are those that are meant",
+            self.name
+        ))
+    }
 }
 
 impl Bound {
@@ -156,6 +190,27 @@ mod tests {
             Label { kind: "field_component", region: None, coils: Vec::new(), frequency: None, load: None };
         let term = Term { functional, states: vec![0], weight: 1.0, label };
         Constraint { name: "field".to_owned(), quantity: Quantity::Field(Box::new(term)), limit }
+    }
+
+    #[test]
+    fn a_bound_far_from_the_initial_value_is_said_to_be() {
+        let said = |limit: Limit, initial: f64| constraint(limit).far_bound(initial).unwrap_or_default();
+        assert!(said(Limit::AtLeast(15.0), 1.5e-5).contains("is 1e6 times as much"));
+        assert!(said(Limit::AtMost(2e-6), 1.0).contains("is 2e-6 of that"));
+        assert!(said(Limit::AtMost(2.0), -3.0).contains("of the other sign"));
+        assert!(said(Limit::AtLeast(-2.0), 3.0).contains("of the other sign"));
+        // What has to change its sign, what is near, and what belongs to the value itself.
+        for limit in [
+            Limit::AtMost(-2.0),
+            Limit::AtLeast(-2.0),
+            Limit::AtMost(0.0),
+            Limit::AtMost(900.0),
+            Limit::AtMostRatio(1e6),
+        ] {
+            let initial = if limit == Limit::AtLeast(-2.0) { -3.0 } else { 3.0 };
+            assert_eq!(said(limit, initial), "", "{limit:?}");
+        }
+        assert_eq!(said(Limit::AtMost(2.0), 0.0), "");
     }
 
     #[test]

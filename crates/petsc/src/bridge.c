@@ -35,6 +35,11 @@ static PetscErrorCode on_error(MPI_Comm comm, int line, const char *function, co
     if (text != NULL && text[0] != 0 && message[0] == 0) {
         snprintf(message, sizeof message, "%s (PETSc, %s)", text, function);
     }
+    /* One rank alone may be out of memory, and the others wait for it in what all do together. */
+    if (code == PETSC_ERR_MEM) {
+        fprintf(stderr, "error: rank %d of %d is out of memory: %s\n", fm_rank(), fm_size(), message);
+        fm_abort(4);
+    }
     return code;
 }
 

@@ -132,7 +132,7 @@ pub enum SolverError {
     /// A body on which a force is sought that touches the surface which stands for a conductor.
     #[error(
         "the body `{body}` touches the surface that stands for `{conductor}`, at {}: the force on it is taken in the elements around it, \
-         and what flows in that surface has none; leave a layer of air between the two, or mesh the conductor",
+         and what flows in that surface has none; leave a layer of air between the two, or add the conductor to its regions",
         millimetres(*place)
     )]
     TouchesConductor {

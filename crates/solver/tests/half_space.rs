@@ -129,7 +129,12 @@ fn what_edges_have_more_is_what_a_meshed_bar_has_more() {
 
 /// A quarter of a cylinder with this radius [m] in so many facets, and its surroundings.
 fn cylinder(radius: f64, facets: usize) -> Mesh {
-    let mut rho = vec![0.5 * radius];
+    cylinder_of_layers(&[0.5 * radius], radius, facets)
+}
+
+/// The same with nodes at these radii inside.
+fn cylinder_of_layers(inside: &[f64], radius: f64, facets: usize) -> Mesh {
+    let mut rho = inside.to_vec();
     (0..=24).for_each(|k| rho.push(radius * 1.12_f64.powi(k)));
     let phi = (0..=facets).map(|k| std::f64::consts::FRAC_PI_2 * k as f64 / facets as f64).collect();
     let coil = 1.12_f64.powi(12) * radius..1.12_f64.powi(14) * radius;
@@ -199,6 +204,34 @@ fn what_round_surfaces_have_more_begins_as_the_quotient_of_bessel_functions() {
             assert!((billet - of(i1 / i0)).abs() < tolerance, "{billet}");
             assert!((wire - of(i0 / i1)).abs() < tolerance, "{wire}");
         }
+    }
+}
+
+/// Iron turns the field around itself as its flux gets in: of what the impedance has more its loss feels a part.
+#[test]
+fn what_round_iron_has_more_is_what_a_meshed_cylinder_has_more() {
+    let radius = 10e-3;
+    let walls = ["x_max", "y_max", "z_min", "z_max"];
+    for (skin_depth, permeability) in [(1e-3, 1.0), (1e-3, 10.0), (1e-3, 100.0), (2e-3, 100.0)] {
+        let material = material(skin_depth, permeability);
+        let mut layers = vec![radius - 0.125 * skin_depth];
+        while layers[layers.len() - 1] > 0.4 * radius {
+            let depth = radius - layers[layers.len() - 1];
+            layers.push(radius - depth - 0.3 * depth.max(0.4 * skin_depth));
+        }
+        layers.reverse();
+        let meshed = {
+            let mesh = cylinder_of_layers(&layers, radius, 18);
+            let materials = vec![Material::AIR, material, Material::AIR];
+            let setup = FieldModelSetup { materials, ..across(&mesh, Order::Quadratic, &walls) };
+            let (model, solution) = solved(&mesh, setup);
+            solution.losses(&model, &mesh)[0].1
+        };
+        let found = replaced(&cylinder(radius, 18), material, |mesh| across(mesh, Order::Quadratic, &walls));
+        let (share, more) = (found.share(), meshed / found.of_surface - 1.0);
+        let of_given_field = 0.5 * skin_depth / radius;
+        println!("{skin_depth} m, permeability {permeability}: {share:.5} of {more:.5}; {of_given_field}");
+        assert!((share - more).abs() < 0.15 * of_given_field, "{share} of {more}");
     }
 }
 

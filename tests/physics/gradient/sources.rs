@@ -8,11 +8,15 @@ use crate::support::{changed, setup, setup_of};
 
 /// Every other family and order on the quick shield, with its plate as a surface and meshed; the fewer directions the dearer.
 #[test]
-fn the_gradient_of_all_elements_is_exact_around_an_impedance_surface_in_a_conductor_and_for_its_loss() {
-    let loss = "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }]";
-    let surface = vec!["mesh.shield.refinement=0.3", loss];
+fn the_gradient_of_all_elements_is_exact_around_an_impedance_surface_in_a_conductor_and_for_its_loss_and_force()
+ {
+    let bounds = "constraints=[{ kind = \"loss\", region = \"plate\", upper_ratio = 2 }, \
+                  { kind = \"force\", region = \"shield\", direction = [0, 0, 1], upper = \"1 kN\" }, \
+                  { kind = \"torque\", region = \"shield\", direction = [1, 0, 0], upper = \"1 kN m\" }]";
+    let body = "forces=[{ name = \"shield\", regions = [\"plate\"], about = [0, \"-20 mm\", 0] }]";
+    let surface = vec!["mesh.shield.refinement=0.3", body, bounds];
     let volume =
-        [&MESHED[..], &["mesh.shield.refinement=0.25", "mesh.shield.skin=[\"2 mm\"]", loss]].concat();
+        [&MESHED[..], &["mesh.shield.refinement=0.25", "mesh.shield.skin=[\"2 mm\"]", body, bounds]].concat();
     let penalty = [&volume[..], &["analysis.penalty=0.4"]].concat();
     for (elements, order, directions, case) in [
         ("nodal", 2, 1, &surface[..1]),

@@ -86,6 +86,57 @@ fn a_uniform_plate_meets_its_limit_by_the_margin() {
     assert!((sum + 1.0).abs() < 1e-12, "a uniform motion changes all alike: {sum}");
 }
 
+#[test]
+fn linear_limits_and_bounds_keep_the_smooth_bound() {
+    let both = ["design.surface=[\"plate_bottom\", \"plate_top\"]", "design.direction=\"normal\""];
+    for (overrides, has_limits) in [
+        (MESHED.to_vec(), false),
+        ([&MESHED[..], &["design.grid=[5, 9]"]].concat(), true),
+        ([&MESHED[..], &both].concat(), true),
+    ] {
+        let mut setup = shield(&overrides);
+        let count = variables(&setup.problem);
+        for (limit, step) in [(ThicknessLimit::Minimum(0.008), -1e-4), (ThicknessLimit::Maximum(0.012), 1e-4)]
+        {
+            let mut bound = bound_of(&setup, limit);
+            bound.restrict(setup.problem.shape_mut().expect("a shape"));
+            let shape = setup.problem.shape().expect("a shape");
+            let (lower, upper) = (shape.lower().to_vec(), shape.upper().to_vec());
+            let excess = |p: &[f64]| {
+                let limits = bound.limits(p).expect("linear ones");
+                assert_eq!(!limits.is_empty(), has_limits, "{overrides:?}");
+                let beyond = |k: usize| (lower[k] - p[k]).max(p[k] - upper[k]);
+                let of_bounds = (0..count).map(beyond).fold(f64::NEG_INFINITY, f64::max);
+                limits.iter().map(|(c, _)| *c).fold(of_bounds, f64::max)
+            };
+            // Up to where the first of them ends the way.
+            let mut p = vec![0.0; count];
+            while excess(&p) <= 0.0 {
+                p.iter_mut().enumerate().for_each(|(k, p)| *p += step * (1.0 + 0.3 * (k as f64).sin()));
+            }
+            let (beyond, _) = evaluate(&setup, &bound, &p);
+            p.iter_mut().enumerate().for_each(|(k, p)| *p -= step * (1.0 + 0.3 * (k as f64).sin()));
+            let (within, _) = evaluate(&setup, &bound, &p);
+            println!("{overrides:?}, {limit:?}: {within} {beyond}");
+            assert!(within <= 0.0 && within > -1e-3 && within < beyond, "{within} {beyond}");
+            // The derivatives of the limits are those of their values.
+            let q: Vec<f64> = p.iter().enumerate().map(|(k, p)| p + 1e-3 * (k as f64).cos()).collect();
+            let [here, there] = [&p, &q].map(|p| bound.limits(p).expect("linear ones"));
+            for ((c, gradient), (d, _)) in here.iter().zip(&there) {
+                let change: f64 = gradient.iter().zip(&q).zip(&p).map(|((g, q), p)| g * (q - p)).sum();
+                assert!((d - c - change).abs() < 1e-12, "{c} {d} {change}");
+            }
+        }
+    }
+    let mut free = shield(&FREE);
+    let mut bound = bound_of(&free, ThicknessLimit::Minimum(0.008));
+    bound.restrict(free.problem.shape_mut().expect("a shape"));
+    assert!(
+        bound.limits(&vec![0.0; variables(&free.problem)]).is_none(),
+        "the map decides about the upper face"
+    );
+}
+
 /// The upper face of the plate follows the elastic body.
 const FREE: [&str; 3] = [MESHED[0], MESHED[1], "remesh.free=[\"plate_top\"]"];
 

@@ -1,9 +1,12 @@
-//! Forces on coils against closed forms: two coaxial coils, and a coil over an iron half space.
+//! Forces on coils against closed forms: two coaxial coils, and a coil over a half space of iron or of a conductor.
 //!
 //! The body is the air that holds a winding: nothing inside it is deformed, so that the force is that on the current. Coaxial
 //! loops with the radii `a` and `b` at the distance `z` attract each other by `−I J dM/dz`,
 //! `dM/dz = −½ μ0 a b z ∫ cos φ (a² + b² + z² − 2ab cos φ)^(−3/2) dφ` over the circle (Neumann's formula; Jackson, Classical
 //! Electrodynamics, section 5.17, has the image of a current in a half space of permeability μr, `(μr − 1)/(μr + 1)` as large).
+//! Over a conductor each wave `J1(kr) e^(−kz)` of the coil's field is reflected (Dodd and Deeds, J. Appl. Phys. 39 (1968) 2829).
+
+use std::f64::consts::PI;
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
@@ -11,8 +14,8 @@ use fluxmorph_geometry::generate::{BoxRegion, BoxesParameters, boxes};
 use fluxmorph_solver::coil::{Coil, Frame, Racetrack};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{
-    Boundary, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, Order,
-    RigidMotion,
+    Boundary, Conductor, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material,
+    Order, RigidMotion, SurfaceLaw,
 };
 
 /// Inner radius, width and height of every winding [m].
@@ -51,6 +54,30 @@ fn exact() -> f64 {
         }
     }
     sum * CURRENT * CURRENT / (filaments.len() * filaments.len()) as f64
+}
+
+/// The mean force [N] that pushes the coil off a half space whose waves are reflected with a factor, under an amplitude of
+/// `CURRENT`.
+fn pushed_off(reflected: impl Fn(f64) -> c64) -> f64 {
+    let [inner, width, height] = WINDING;
+    let n = 6;
+    let part = |i: usize, size: f64| size * ((i as f64 + 0.5) / n as f64 - 0.5);
+    // The mean over the circle is exact to the last digits.
+    let bessel = |x: f64| {
+        let angles = (0..240).map(|k| PI * (f64::from(k) + 0.5) / 240.0);
+        angles.map(|angle| (angle - x * angle.sin()).cos()).sum::<f64>() / 240.0
+    };
+    let step = 2.0;
+    let waves = (1..1000).map(|i| {
+        let k = step * f64::from(i);
+        let of_filament = |own: usize| {
+            let (radius, z) = (inner + 0.5 * width + part(own / n, width), HEIGHT + part(own % n, height));
+            radius * bessel(k * radius) * (-k * z).exp()
+        };
+        let of_coil = (0..n * n).map(of_filament).sum::<f64>() / (n * n) as f64;
+        -reflected(k).re * k * of_coil * of_coil
+    });
+    0.5 * PI * VACUUM_PERMEABILITY * CURRENT * CURRENT * step * waves.sum::<f64>()
 }
 
 /// A quarter of one coil at `HEIGHT`, in air that is a body, in a sleeve of more air; below the plane z = 0 another coil alike,
@@ -96,12 +123,20 @@ fn coil(name: &str, z: f64) -> Coil {
     Coil { name: name.to_owned(), ampere_turns: c64::from(CURRENT), shape: shape.into() }
 }
 
-fn solved(
+fn solved(mesh: &Mesh, coils: Vec<Coil>, elements: (ElementFamily, Order)) -> (FieldModel, FieldSolution) {
+    solved_beside(mesh, coils, elements, (0.0, Vec::new()))
+}
+
+/// The field beside conductors at a frequency [Hz].
+fn solved_beside(
     mesh: &Mesh,
     coils: Vec<Coil>,
     (family, order): (ElementFamily, Order),
+    (frequency, conductors): (f64, Vec<Conductor>),
 ) -> (FieldModel, FieldSolution) {
-    let surfaces = ["x_min", "y_min", "x_max", "y_max", "z_min", "z_max"];
+    // Below a half space that its surface stands for there is nothing.
+    let walls = if conductors.is_empty() { 6 } else { 5 };
+    let surfaces = &["x_min", "y_min", "x_max", "y_max", "z_max", "z_min"][..walls];
     let material = |name: &String| {
         let relative_permeability = if name == "iron" { PERMEABILITY } else { 1.0 };
         Material { relative_permeability, conductivity: 0.0 }
@@ -111,7 +146,9 @@ fn solved(
         order,
         materials: mesh.topology().region_names().iter().map(material).collect(),
         coils,
-        boundaries: surfaces.map(|surface| (surface.to_owned(), Boundary::FluxParallel)).to_vec(),
+        boundaries: surfaces.iter().map(|name| ((*name).to_owned(), Boundary::FluxParallel)).collect(),
+        frequency,
+        conductors,
         ..FieldModelSetup::default()
     };
     let model = FieldModel::new(mesh, setup).expect("a sound problem");
@@ -160,5 +197,47 @@ fn a_coil_and_an_iron_half_space_attract_each_other_as_the_coil_and_its_image_do
     println!("{near:.6} N, {far:.6} N further out, {on_the_iron:.6} N on the iron, exact {exact:.6} N");
     for force in [near, far, on_the_iron] {
         assert!((force / exact - 1.0).abs() < 0.01, "{force} against {exact}");
+    }
+}
+
+/// The body is its surface alone, and what flows there is pushed as much as the coil.
+#[test]
+fn a_coil_and_the_surface_of_a_half_space_push_each_other_as_its_reflected_waves_say() {
+    let frequency = 1e3;
+    let angular_frequency = 2.0 * PI * frequency;
+    let full = mesh(true);
+    let half_space = full.topology().region("iron").expect("it is named");
+    let (mesh, surface) = full.without_region(half_space).expect("what is left");
+    let conductor = |relative_permeability: f64, skin_depth: f64| {
+        let permeability = VACUUM_PERMEABILITY * relative_permeability;
+        let conductivity = 2.0 / (angular_frequency * permeability * skin_depth * skin_depth);
+        // Waves in the half space.
+        let inside = move |k: f64| c64::new(k * k, 2.0 / (skin_depth * skin_depth)).sqrt();
+        let reflected = move |k: f64| {
+            let outside = c64::from(relative_permeability * k);
+            (outside - inside(k)) / (outside + inside(k))
+        };
+        let law = SurfaceLaw::Impedance(Material { relative_permeability, conductivity });
+        (law, frequency, pushed_off(reflected))
+    };
+    // Constant in time, so that the mean is twice that of an amplitude.
+    let perfect = (SurfaceLaw::Perfect, 0.0, 2.0 * pushed_off(|_| c64::from(-1.0)));
+    let (copper, iron) = (conductor(1.0, 1e-3), conductor(30.0, 0.3e-3));
+    assert!((perfect.2 / exact() - 1.0).abs() < 1e-4, "{} against {} of the image", perfect.2, exact());
+    let [edge, nodal] = QUADRATIC;
+    for ((law, frequency, exact), elements) in
+        [(perfect, edge), (copper, edge), (copper, nodal), (iron, edge), (iron, nodal)]
+    {
+        let conductors = vec![Conductor { name: "iron".to_owned(), surface: surface.clone(), law }];
+        let coils = vec![coil("upper", HEIGHT)];
+        let field = solved_beside(&mesh, coils, elements, (frequency, conductors));
+        let near = found(&mesh, &field, &["upper"]);
+        let on_the_surface = -found(&mesh, &field, &["iron"]);
+        println!(
+            "{law:?}, {elements:?}: {near:.6} N, {on_the_surface:.6} N on the surface, exact {exact:.6} N"
+        );
+        for force in [near, on_the_surface] {
+            assert!((force / exact - 1.0).abs() < 0.01, "{law:?}, {elements:?}: {force} against {exact}");
+        }
     }
 }

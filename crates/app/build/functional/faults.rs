@@ -120,15 +120,6 @@ fn body_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
             faults.push(source.unknown_name(&format!("{path}.region"), "body of [[forces]]", name, &known));
         }
     }
-    for (k, force) in config.forces.iter().enumerate() {
-        for (i, name) in force.regions.iter().enumerate() {
-            if !config.is_meshed(name) {
-                let path = format!("forces[{k}].regions[{i}]");
-                let message = format!("`{name}` is replaced by its surface, so there is no body to displace");
-                faults.push(source.diagnostic(&path, message).expected("a region that is meshed"));
-            }
-        }
-    }
     faults
 }
 

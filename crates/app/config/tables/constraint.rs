@@ -22,8 +22,9 @@ table! {
     /// design of a run is the best one that keeps all constraints; if none does, the one that is least beyond a bound, with a
     /// warning.
     ///
-    /// The bounds on a thickness are smooth ones on the safe side: the true least thickness is a little greater, the greatest a
-    /// little smaller. Where the flat body is to be limited, `design.lower` and `design.upper` do the same at no cost. With
+    /// The bounds on a thickness are on the safe side by a hundredth of them: the true least thickness is a little greater, the
+    /// greatest a little smaller. Where the opposite face stands still and the initial design keeps them they are bounds on the
+    /// variables, which `result.json` shows; elsewhere one smooth function of all places, which searches are slow along. With
     /// both `minimum` and `maximum` one entry makes two constraints, with `_minimum` and `_maximum` behind their names.
     ///
     /// ```toml
@@ -254,6 +255,13 @@ impl Group for Limit {
 }
 
 impl Limit {
+    /// Whether the bound is a share of the initial value.
+    pub fn is_share_of_initial(&self) -> bool {
+        let is_share =
+            |bound: &ValueBound| matches!(bound, ValueBound::AtMostRatio(_) | ValueBound::AtLeastRatio(_));
+        matches!(self, Self::Functional { bound, .. } if is_share(bound))
+    }
+
     /// The functional that is limited; `None` for a thickness.
     pub fn functional(&self) -> Option<&Functional> {
         match self {

@@ -18,7 +18,8 @@ table! {
         /// What the body is called in results; objectives and constraints of the kinds `force` and `torque` name it as their
         /// `region`. Each name once.
         name: String = TEXT, need "\"pole\"";
-        /// The regions that make up the body, meshed: iron, magnets, or windings that are regions.
+        /// The regions that make up the body: iron, magnets, windings that are regions, and conductors, meshed or replaced by
+        /// their surfaces.
         regions: Vec<String> = not_empty(NAMES), need "[\"pole\"]";
         /// The point about which the torque is taken [m].
         about: [f64; 3] = length(FINITE) => [0.0; 3];

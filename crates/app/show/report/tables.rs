@@ -160,11 +160,19 @@ fn constraints(result: &RunResult, constraints: &[Constraint]) -> Markup {
     let row = |c: &ConstraintResult| {
         let (unit, factor) = constraint_unit(&c.name, constraints);
         let on_other = checked.iter().find(|own| own.name == c.name);
-        let on_other =
-            on_other.map(|own| format!("{} {unit}, {}", number(factor * own.value, 5), verdict(own)));
-        let [value, bound] = [c.value, c.bound].map(|v| format!("{} {unit}", number(factor * v, 5)));
-        let bar =
-            c.error_estimate.map(|error| format!("± {} {unit}", number(factor * SAFETY * error.abs(), 2)));
+        let shown = |v: f64| format!("{} {unit}", number(factor * v, 5));
+        let own = constraints.iter().find(|own| own.is_called(&c.name));
+        let is_shared = own.is_some_and(|own| own.limit.is_share_of_initial());
+        // Its own bound there is a share of another initial value.
+        let of_bound = |own: &ConstraintResult| {
+            if is_shared { format!(" of {}", shown(own.bound)) } else { String::new() }
+        };
+        let on_other = on_other.map(|own| format!("{}{}, {}", shown(own.value), of_bound(own), verdict(own)));
+        let [value, bound] = [c.value, c.bound].map(shown);
+        // The errors of a value and of a bound that is a share of the initial one cancel in part.
+        let what = if is_shared { "difference " } else { "" };
+        let bar = |error: f64| format!("{what}± {} {unit}", number(factor * SAFETY * error.abs(), 2));
+        let bar = c.error_estimate.map(bar);
         let mut row = vec![c.name.clone(), value, bar.unwrap_or_default(), bound, verdict(c).to_owned()];
         if !checked.is_empty() {
             row.push(on_other.unwrap_or_default());

@@ -319,6 +319,11 @@ impl DesignSurface {
         &self.points
     }
 
+    /// How far every node goes along its direction where its surface moves by one: more than one on a sharp edge, whose faces move.
+    pub fn mitres(&self) -> &[f64] {
+        &self.mitres
+    }
+
     /// How far the surface moves at every node [m] for the variables `p` [m]: the node along its direction, or, on a sharp edge,
     /// the faces around it along their normals.
     pub fn normal_displacements(&self, p: &[f64]) -> Vec<f64> {

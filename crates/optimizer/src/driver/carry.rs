@@ -129,7 +129,7 @@ impl Run<'_> {
         let step: Vec<f64> = p.iter().zip(&carried.design).map(|(p, own)| p - own).collect();
         let along = |gradient: &[f64]| gradient.iter().zip(&step).map(|(g, s)| g * s).sum::<f64>();
         sample.value += along(&sample.gradient);
-        for (value, gradient) in &mut sample.constraints {
+        for (value, gradient) in sample.constraints.iter_mut().chain(&mut sample.limits) {
             *value += along(gradient);
         }
         let (c, slope) = excess(carried.room);

@@ -57,11 +57,13 @@ impl Run<'_> {
     /// The best design or the one before with what is known of it, where the mesh carries no more than that of the step to a design:
     /// a computation would tell nothing new.
     fn find_repetition(&self, carried: &Carriage) -> Option<(Vec<f64>, Sample)> {
-        // What several ranks compute comes back to rounding alone, and a replay must decide alike.
-        if !carried.is_cut() || self.is_shared_out {
+        let p = &carried.design;
+        // What several ranks compute comes back to rounding alone, and a replay must decide alike; what is replayed may be of one
+        // process, which has no record of a design that it knew.
+        let has_record = || self.next.as_ref().is_none_or(|record| self.is_of(record, p));
+        if !carried.is_cut() || self.is_shared_out && has_record() {
             return None;
         }
-        let p = &carried.design;
         let (lower, upper) = (self.shape().lower(), self.shape().upper());
         let is_near = |own: &[f64]| {
             (0..p.len()).all(|k| (p[k] - own[k]).abs() <= NEARLY_THE_SAME * (upper[k] - lower[k]))
@@ -184,6 +186,13 @@ impl Run<'_> {
                 .members
                 .iter()
                 .map(|(value, gradient)| (scale * value, gradient.iter().map(|d| scale * d).collect()))
+                .collect(),
+            limits: self
+                .problem
+                .constraints()
+                .iter()
+                .filter_map(|own| own.limits(&record.design))
+                .flatten()
                 .collect(),
         }
     }

@@ -89,7 +89,7 @@ impl Reduced {
         // The worst case may fall only as far as the other terms stay below it.
         let difference = |of: &[f64]| of.iter().zip(&gradient).map(|(own, worst)| own - worst).collect();
         let others = sample.members.iter().map(|(value, of)| (value - sample.value, difference(of)));
-        let holding = sample.constraints.iter().cloned().chain(others);
+        let holding = sample.constraints.iter().chain(&sample.limits).cloned().chain(others);
         let held =
             |(value, gradient): (f64, Vec<f64>)| Held { gradient, slack: (-value).max(0.0), multiplier: 0.0 };
         let held = holding.filter(|(value, _)| *value > -ACTIVE).map(held).collect();
@@ -124,7 +124,7 @@ mod tests {
 
     fn sample(gradient: &[f64], constraints: &[(f64, Vec<f64>)]) -> Sample {
         let (gradient, constraints) = (gradient.to_vec(), constraints.to_vec());
-        Sample { value: -0.5, gradient, constraints, members: Vec::new() }
+        Sample { value: -0.5, gradient, constraints, ..Sample::default() }
     }
 
     #[test]

@@ -19,12 +19,17 @@ impl Run<'_> {
     /// Whether a record is that of a design on this mesh: to the last bit, or closely where ranks had a share in it.
     pub(super) fn is_of(&self, record: &Record, p: &[f64]) -> bool {
         let follows = record.row.evaluation == self.evaluations() && record.design.len() == p.len();
-        let pairs = || record.design.iter().zip(p);
-        if self.is_shared_out {
-            let largest = record.design.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
-            return follows && pairs().all(|(was, is)| (was - is).abs() <= CLOSE * largest);
-        }
-        follows && pairs().all(|(was, is)| was.to_bits() == is.to_bits())
+        follows && self.first_other(&record.design, p).is_none()
+    }
+
+    /// The first variable in which a design is another one than that of a record.
+    fn first_other(&self, was: &[f64], is: &[f64]) -> Option<usize> {
+        let largest = was.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+        let is_other = |(was, is): (&f64, &f64)| match self.is_shared_out {
+            true => (was - is).abs() > CLOSE * largest,
+            false => was.to_bits() != is.to_bits(),
+        };
+        was.iter().zip(is).position(is_other)
     }
 
     /// Ends a search where the run had come to its last evaluation, which a step back took: now there may be more of them.
@@ -37,8 +42,7 @@ impl Run<'_> {
     /// Why a record is not the answer to what the method asks for.
     pub(super) fn difference(&self, record: &Record, p: &[f64]) -> Error {
         let Record { row, design, .. } = record;
-        let differing = design.iter().zip(p).position(|(was, is)| was.to_bits() != is.to_bits());
-        let cause = match differing {
+        let cause = match self.first_other(design, p) {
             _ if row.evaluation != self.evaluations() => {
                 format!("evaluation {} follows where {} is expected", row.evaluation, self.evaluations())
             }

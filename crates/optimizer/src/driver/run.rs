@@ -121,15 +121,24 @@ impl<'a> Run<'a> {
         self.problem.constraints().len()
     }
 
+    /// The constraints that the method is not shown, ascending, and the number of limits in their place.
+    pub(super) fn replaced(&self) -> (Vec<usize>, usize) {
+        let p = self.shape().initial();
+        let constraints = self.problem.constraints().iter().enumerate();
+        let replaced = constraints.filter_map(|(k, own)| Some((k, own.limits(p)?.len())));
+        let (replaced, counts): (Vec<_>, Vec<usize>) = replaced.unzip();
+        (replaced, counts.iter().sum())
+    }
+
     /// Terms of a worst case; none of a sum.
     pub(super) fn member_count(&self) -> usize {
         let worst = self.problem.objective().filter(|own| own.combination == Combination::WorstCase);
         worst.map_or(0, |objective| objective.terms.len())
     }
 
-    /// Constraints that the method sees: those of the problem, and the room of the mesh.
-    pub(super) fn method_constraint_count(&self) -> usize {
-        self.constraint_count() + usize::from(self.takes_constraints())
+    /// Constraints that the method sees beside those of the problem: the room of the mesh.
+    pub(super) fn mesh_constraint_count(&self) -> usize {
+        usize::from(self.takes_constraints())
     }
 
     pub(super) fn takes_constraints(&self) -> bool {
@@ -241,6 +250,7 @@ impl<'a> Run<'a> {
         if self.promised.is_none() {
             self.promised = Some(self.promised_gain(&sample, &record.design));
             self.note_violations(&sample);
+            self.note_far_bounds(&record.constraints);
         }
         self.latest = Some(sample.clone());
         self.repeated = 0;
@@ -273,6 +283,16 @@ impl<'a> Run<'a> {
                 broken.join(", ")
             ));
         }
+    }
+
+    /// Says which bounds are given in a unit that is hardly meant.
+    fn note_far_bounds(&mut self, initial: &[(f64, Vec<f64>)]) {
+        if self.first_evaluation > 0 {
+            return;
+        }
+        let found = self.problem.constraints().iter().zip(initial);
+        let found: Vec<String> = found.filter_map(|(own, (value, _))| own.far_bound(*value)).collect();
+        found.iter().for_each(|text| self.observer.note(text));
     }
 
     fn promised_gain(&self, sample: &Sample, design: &[f64]) -> f64 {

@@ -94,22 +94,26 @@ impl<'a> Search<'a> {
     pub(super) fn minimise(&mut self, run: &mut Run<'_>) -> Ended {
         let [lower, upper] = self.trust.bounds(run.shape());
         let restores = self.is_restoring && run.violates();
-        let of_problem = if restores { run.constraint_count() } else { 0 };
+        let (replaced, limits) = run.replaced();
+        let shown = run.constraint_count() - replaced.len() + limits;
+        let of_problem = if restores { shown } else { 0 };
         let minimisation = Minimisation {
             algorithm: self.settings.algorithm,
             lower,
             upper,
-            constraints: run.method_constraint_count() - of_problem,
+            constraints: shown + run.mesh_constraint_count() - of_problem,
             members: if restores { of_problem } else { run.member_count() },
             ftol_rel: self.ftol_rel,
             xtol_rel: self.settings.xtol_rel,
             first_step: self.settings.first_step,
         };
         let before = (run.evaluations(), run.incumbent_values());
-        let outcome = minimise(&minimisation, &run.centre(), |p| match run.evaluate(p)? {
-            _ if restores && !run.violates() => Err(Stop::CutShort),
-            sample if restores => Ok(with_violation_as_objective(sample, of_problem)),
-            sample => Ok(sample),
+        let outcome = minimise(&minimisation, &run.centre(), |p| {
+            match run.evaluate(p)?.with_limits(&replaced, run.constraint_count()) {
+                _ if restores && !run.violates() => Err(Stop::CutShort),
+                sample if restores => Ok(with_violation_as_objective(sample, of_problem)),
+                sample => Ok(sample),
+            }
         });
         let evaluations = run.evaluations() - before.0;
         if let Outcome::Interrupted(Stop::Mesh(refusal)) = &outcome {
@@ -178,6 +182,8 @@ impl<'a> Search<'a> {
                 self.after_refusal(run, refusal.clone(), gained)
             }
             _ => NextStep::Stop(match ending {
+                // At an optimum that bounds and constraints hold there is no step but rounding.
+                Ending::Roundoff if run.is_held() => StopReason::ObjectiveConverged,
                 Ending::Roundoff => StopReason::RoundoffLimited,
                 _ if run.is_held_back || self.is_throttled(run) => StopReason::MeshLimited,
                 Ending::Objective | Ending::Entered => StopReason::ObjectiveConverged,

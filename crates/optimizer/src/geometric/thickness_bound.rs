@@ -1,15 +1,20 @@
 //! Least and greatest thickness along the design's direction, as one smooth constraint.
 //!
-//! A limit on the thickness at every design node is as many constraints as the surface has nodes. MMA and SLSQP carry dense arrays of that number times the number of
-//! variables and solve a dual problem in it; only where the body is as thick everywhere does it come down to bounds on
-//! the variables. So the limits are gathered in the Kreisselmeier–Steinhauser function (G. Kreisselmeier, R. Steinhauser,
+//! A limit on the thickness at every design node is as many constraints as the surface has nodes. MMA and SLSQP carry dense arrays of
+//! that number times the number of variables and solve a dual problem in it. So the limits are gathered in the Kreisselmeier–Steinhauser function (G. Kreisselmeier, R. Steinhauser,
 //! IFAC Proceedings 12 (1979) 113–117): of `g_i = t_min − t_i`, or `t_i − t_max`,
 //!
 //! `KS = (1/ρ) ln Σ exp(ρ g_i)`, `max g_i ≤ KS ≤ max g_i + ln n / ρ`.
 //!
 //! It is smooth and never below the largest `g_i`: what satisfies it satisfies every limit. `ρ` is chosen so that at most
-//! one per cent of the limit is given away.
+//! one per cent of the limit is given away. As sharp as that it bends within a hundredth of the thickness, and methods that go
+//! along its tangents come forward in steps of that size. Where the elastic map does not decide about the faces opposite every `g_i`
+//! is linear in the variables, and the limit is shown to a method as what it is ([`ThicknessBound::restrict`]): bounds on the variables
+//! that move one node each, and the linear limits of the others as long as these are not too many for its dual problem.
 
+use std::collections::BTreeMap;
+
+use fluxmorph_geometry::tet4::dot;
 use fluxmorph_remesh::{Moved, RemeshError};
 
 use super::NoThickness;
@@ -19,6 +24,9 @@ use crate::problem::Shape;
 /// What the smooth bound gives away at most, as a share of the limit: below what a workshop holds, and still smooth over
 /// the change of thickness of one optimisation step.
 pub const MARGIN: f64 = 0.01;
+
+/// Most linear limits that a method is shown: its dual problem has a variable for each.
+const MOST_LINEAR_LIMITS: usize = 1000;
 
 /// A limit of the thickness [m].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +43,23 @@ pub struct ThicknessBound {
     bound: ThicknessLimit,
     /// `ρ` [1/m].
     sharpness: f64,
+    /// What keeps the limit in its place; `None` where methods are shown the function itself.
+    linear: Option<Vec<LinearLimit>>,
+}
+
+/// A limit `room + Σ slope_k p_k ≥ 0`.
+#[derive(Clone, Debug)]
+struct LinearLimit {
+    /// Left at `p = 0` [m].
+    room: f64,
+    /// By variable, ascending [m/m].
+    slopes: Vec<(usize, f64)>,
+}
+
+impl LinearLimit {
+    fn value(&self, p: &[f64]) -> f64 {
+        self.room + self.slopes.iter().map(|&(k, slope)| slope * p[k]).sum::<f64>()
+    }
 }
 
 impl ThicknessBound {
@@ -43,14 +68,83 @@ impl ThicknessBound {
     pub fn new(shape: &Shape, bound: ThicknessLimit) -> Result<Self, NoThickness> {
         let thickness = shape.thickness().ok_or(NoThickness)?;
         let (ThicknessLimit::Minimum(limit) | ThicknessLimit::Maximum(limit)) = bound;
-        // Two at least, as ln 1 = 0; a limit of zero is held as one of a micrometre.
+        // Two at least, as ln 1 = 0.
         let count = thickness.at_nodes().count().max(2) as f64;
-        Ok(Self { bound, sharpness: count.ln() / (MARGIN * limit.abs().max(1e-6)) })
+        Ok(Self { bound, sharpness: count.ln() / given_away(limit), linear: None })
     }
 
     /// The limit.
     pub fn bound(&self) -> ThicknessLimit {
         self.bound
+    }
+
+    /// What a method is shown at a design in place of the function: `c ≤ 0` as a share of the limit, with its derivatives. Nothing where
+    /// bounds on the variables keep the limit; `None` where there is nothing in its place.
+    pub fn limits(&self, p: &[f64]) -> Option<Vec<(f64, Vec<f64>)>> {
+        let (ThicknessLimit::Minimum(limit) | ThicknessLimit::Maximum(limit)) = self.bound;
+        let unit = given_away(limit) / MARGIN;
+        let shown = |own: &LinearLimit| {
+            let mut gradient = vec![0.0; p.len()];
+            own.slopes.iter().for_each(|&(k, slope)| gradient[k] = -slope / unit);
+            (-own.value(p) / unit, gradient)
+        };
+        Some(self.linear.as_ref()?.iter().map(shown).collect())
+    }
+
+    /// Gives the shape the bounds that keep the limit at nodes which one variable moves alone, and finds the linear limits of the
+    /// others. What keeps all of them satisfies the smooth function.
+    pub fn restrict(&mut self, shape: &mut Shape) {
+        let Some(limits) = self.linear_limits(shape) else { return };
+        let is_kept_at_first = |own: &LinearLimit| own.value(shape.initial()) >= 0.0;
+        let is_bound = |own: &LinearLimit| own.slopes.len() == 1 && is_kept_at_first(own);
+        let (bounds, others): (Vec<_>, Vec<_>) = limits.into_iter().partition(is_bound);
+        if others.len() > MOST_LINEAR_LIMITS {
+            return;
+        }
+        let (mut lower, mut upper) = (shape.lower().to_vec(), shape.upper().to_vec());
+        for LinearLimit { room, slopes } in bounds {
+            let (k, slope) = slopes[0];
+            let bound = -room / slope;
+            if slope > 0.0 {
+                lower[k] = lower[k].max(bound);
+            } else {
+                upper[k] = upper[k].min(bound);
+            }
+        }
+        shape.set_bounds([lower, upper]);
+        self.linear = Some(others);
+    }
+
+    /// The limit at every node that moves, on the safe side by what the smooth function gives away; `None` where the elastic map decides
+    /// about a node opposite.
+    fn linear_limits(&self, shape: &Shape) -> Option<Vec<LinearLimit>> {
+        let (thickness, surface) = (shape.thickness()?, shape.surface());
+        let map = shape.motion().map();
+        let mut limits = Vec::new();
+        for ((_, initial), (_, wall)) in thickness.at_nodes().zip(thickness.walls(surface, |_| [0.0; 3])) {
+            let (sign, room) = match self.bound {
+                ThicknessLimit::Minimum(limit) => (1.0, initial - limit - given_away(limit)),
+                ThicknessLimit::Maximum(limit) => (-1.0, limit - given_away(limit) - initial),
+            };
+            let mut slopes: BTreeMap<usize, f64> = BTreeMap::new();
+            for (node, derivative) in wall.derivatives {
+                let Ok(place) = surface.nodes().binary_search(&node) else {
+                    if map.is_unknown(node) {
+                        return None;
+                    }
+                    continue;
+                };
+                let along = sign * surface.mitres()[place] * dot(derivative, surface.directions()[place]);
+                for &(variable, weight) in &surface.rows()[place] {
+                    *slopes.entry(variable).or_default() += along * weight;
+                }
+            }
+            let slopes: Vec<_> = slopes.into_iter().filter(|(_, slope)| *slope != 0.0).collect();
+            if !slopes.is_empty() {
+                limits.push(LinearLimit { room, slopes });
+            }
+        }
+        Some(limits)
     }
 
     /// How far the limit is exceeded on a moved mesh [m], at most 0 where it is satisfied, and the derivative with respect to
@@ -91,6 +185,11 @@ impl ThicknessBound {
         };
         Ok((greatest + sum.ln() / self.sharpness, shape.surface().gradient(&at_design)))
     }
+}
+
+/// What the smooth function of a limit gives away at most [m]; a limit of zero is held as one of a micrometre.
+fn given_away(limit: f64) -> f64 {
+    MARGIN * limit.abs().max(1e-6)
 }
 
 /// Whether a node opposite is a design node, or one that the elastic map decides.

@@ -37,9 +37,21 @@ pub struct Sample {
     pub constraints: Vec<(f64, Vec<f64>)>,
     /// Of a worst case: the terms of which `value` is the largest, with their gradients.
     pub members: Vec<(f64, Vec<f64>)>,
+    /// Linear limits in place of constraints that a method is not shown, like these.
+    pub limits: Vec<(f64, Vec<f64>)>,
 }
 
 impl Sample {
+    /// What a method is shown: the limits in place of the constraints with these numbers, ascending, behind the first `count`.
+    #[must_use]
+    pub fn with_limits(mut self, replaced: &[usize], count: usize) -> Self {
+        let behind = self.constraints.split_off(count);
+        replaced.iter().rev().for_each(|&k| drop(self.constraints.remove(k)));
+        self.constraints.append(&mut self.limits);
+        self.constraints.extend(behind);
+        self
+    }
+
     /// Largest excess of a constraint; zero where all are kept but for rounding.
     pub fn violation(&self) -> f64 {
         let worst = self.constraints.iter().map(|(c, _)| *c).fold(0.0, f64::max);

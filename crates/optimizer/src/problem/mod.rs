@@ -62,7 +62,8 @@ enum Responses {
 
 impl Problem {
     /// A field problem on the undeformed mesh `original`, with one state a load case; without a shape nothing moves, and
-    /// constraints on the field alone have a meaning.
+    /// constraints on the field alone have a meaning. Limits of the thickness that are linear become bounds of the shape
+    /// as far as they can ([`crate::geometric::ThicknessBound::restrict`]).
     ///
     /// # Panics
     /// If there is no state, a term is measured on a state that is not there, or a body is constrained without a shape.
@@ -70,8 +71,8 @@ impl Problem {
         original: Mesh,
         states: Vec<FieldModel>,
         objective: Option<WeightedSum>,
-        constraints: Vec<Constraint>,
-        shape: Option<Shape>,
+        mut constraints: Vec<Constraint>,
+        mut shape: Option<Shape>,
     ) -> Self {
         assert!(!states.is_empty(), "a problem has a state");
         let terms = objective.iter().flat_map(|sum| &sum.terms);
@@ -84,6 +85,12 @@ impl Problem {
             shape.is_some() || quantities.all(Quantity::is_of_field),
             "a body that is constrained can move"
         );
+        for constraint in &mut constraints {
+            if let (Quantity::Thickness { measure, .. }, Some(shape)) = (&mut constraint.quantity, &mut shape)
+            {
+                measure.restrict(shape);
+            }
+        }
         let (share, bodies, responses) = (None, Vec::new(), Responses::OfFunctionals);
         Self { original, states, objective, constraints, shape, share, bodies, responses }
     }

@@ -16,7 +16,11 @@
 //! **Round surfaces.** The resistance of a surface with the curvatures `κ₁` along the current and `κ₂` across it is that of a half space
 //! times `1 + δ(κ₂ − κ₁)/2` (S. M. Rytov, J. Exp. Theor. Phys. 10 (1940) 180; a wire of radius `a` has `I₀/I₁`, a billet along the field
 //! `I₁/I₀`, which begin with `1 ± δ/2a`). Of facets all curvature is in the edges between them: the angle between both times the
-//! length, across the edge.
+//! length, across the edge. What the surface is given is no field, but the currents that excite it: by reciprocity a change `δZ` of
+//! its impedance changes that of a coil with the current `I` by `∫ δZ H·H/I²`, without conjugate. Of round surfaces `δZ` is real, so
+//! that the loss changes by `½ δZ Re(H·H)` of the phase of the current: in copper, whose field is in phase, by that of a given
+//! field; in iron, whose field its poles oppose by the flux that gets in, by a third or an eighth of it. Where currents have several
+//! phases `|H|²` is taken.
 //!
 //! **Fields that change.** In a half space a field of wave number `k` along the surface goes down as `exp(−√(γ² + k²) z)` and not as
 //! `exp(−γ z)`, `γ = (1 + j)/δ`. For a given field at the surface, electric or magnetic, that takes `(k δ)²/4` off the loss, to
@@ -32,6 +36,8 @@ use fluxmorph_geometry::topology::{face_key, triangle_edges};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use super::inside_of_outer_faces;
+use crate::boundary::Boundary;
+use crate::circuit::currents;
 use crate::element::triangle::Triangle;
 use crate::element::{Complex3, dot3};
 use crate::fixed_directions::CREASE;
@@ -74,6 +80,9 @@ const NEAR_EDGE: f64 = 4.0;
 
 /// Angle [°] between a surface and its image behind a wall from which on the surface ends there along the wall, and is no wedge.
 const ALONG_WALL: f64 = 150.0;
+
+/// Difference of the squares of two phase factors below which they are one.
+const SAME_PHASE: f64 = 1e-3;
 
 /// Component of a unit vector along an edge across a face that begins at it.
 const ACROSS_FACE: f64 = 0.2;
@@ -127,6 +136,7 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
     let replaced: HashSet<[NodeId; 3]> =
         model.conductors().iter().flat_map(|own| &own.surface).map(|t| face_key(*t)).collect();
     let walls = || outer().map(|facet| facet.nodes).filter(|nodes| !replaced.contains(&face_key(*nodes)));
+    let phase = phase_of_sources(model, solution);
     let of = |conductor: &Conductor| {
         let SurfaceLaw::Impedance(material) = conductor.law else { return None };
         let skin_depth = material.skin_depth(model.angular_frequency())?;
@@ -141,6 +151,7 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
         let triangles: Vec<SurfaceTriangle> =
             conductor.surface.iter().map(of_triangle).collect::<Option<_>>()?;
         let bends = Bends::of(mesh, &conductor.surface, walls());
+        let of_curvature = bends.round.iter().map(|own| own.weigh(&triangles, phase)).sum::<f64>();
         let at_edge = |(triangle, own): (&[NodeId; 3], &SurfaceTriangle)| {
             let strip = bends.strip(mesh, *triangle)?;
             let share = excess_share(strip.angle, strip.width / skin_depth, material.relative_permeability);
@@ -157,13 +168,37 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
             // Waves of no more than a skin depth have hardly any loss.
             of_variation: -of_surface * variation.min(1.0),
             at_edges: conductor.surface.iter().zip(&triangles).filter_map(at_edge).sum(),
-            of_curvature: 0.5 * skin_depth * bends.round.iter().map(|own| own.weigh(&triangles)).sum::<f64>(),
+            of_curvature: 0.5 * skin_depth * of_curvature,
         })
     };
     model.conductors().iter().filter_map(of).collect()
 }
 
+/// `e^(−2jφ)` of the phase `φ`, but for signs, that everything which excites the field has; `None` of several.
+fn phase_of_sources(model: &FieldModel, solution: &FieldSolution) -> Option<c64> {
+    let given = model.coils().iter().map(|coil| coil.ampere_turns);
+    let driven = currents(model, solution).into_iter().map(|(_, current)| current);
+    let is_applied = model.setup().boundaries.iter().any(|(_, own)| matches!(own, Boundary::UniformField(_)));
+    let sources = given.chain(driven).chain(is_applied.then(|| c64::from(1.0)));
+    let mut phases = sources.filter(|own| *own != c64::default()).map(|own| own * own / own.norm_sqr());
+    let first = phases.next()?;
+    phases.all(|own| (own - first).norm() < SAME_PHASE).then(|| first.conj())
+}
+
 impl SurfaceTriangle {
+    /// What the loss changes by with a real impedance that the surface has more along a unit vector, and less across it, over what that
+    /// does to a field of this size: of a phase of what excites it, or, of several, of that size.
+    fn change(&self, along: Point, phase: Option<c64>) -> f64 {
+        let (part, all) = (dot3(self.field, along.map(c64::from)), square(&self.field));
+        match phase {
+            // H is an eighth of a turn behind E, the field times −jω.
+            Some(phase) if all > 0.0 => {
+                -(phase * (2.0 * part * part - dot3(self.field, self.field))).im / all
+            }
+            _ => 2.0 * self.share_along(along) - 1.0,
+        }
+    }
+
     /// Share of the square of the current in the direction of a unit vector along the surface.
     fn share_along(&self, direction: Point) -> f64 {
         let part = dot3(self.field, direction.map(c64::from));
@@ -221,11 +256,12 @@ struct RoundEdge {
 }
 
 impl RoundEdge {
-    /// Its curvature times the loss per area of its facets [W/m], positive for current along it.
-    fn weigh(&self, triangles: &[SurfaceTriangle]) -> f64 {
+    /// Its curvature times the loss per area of its facets [W/m], positive for current along it, as far as a change of the impedance
+    /// changes that loss.
+    fn weigh(&self, triangles: &[SurfaceTriangle], phase: Option<c64>) -> f64 {
         let of = |k: usize| {
             let own = &triangles[k];
-            own.loss / norm(own.area) * (2.0 * own.share_along(self.direction) - 1.0)
+            own.loss / norm(own.area) * own.change(self.direction, phase)
         };
         0.5 * self.turn * (of(self.sides[0]) + of(self.sides[1]))
     }

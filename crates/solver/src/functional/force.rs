@@ -2,8 +2,8 @@
 //!
 //! A rigid virtual velocity `v` of the body's nodes, zero at all others, deforms the elements that touch the body from outside.
 //! The force is minus the work of Maxwell's stress there, `−∫σ:∇v` ([`crate::element::virtual_work`]), the rate at which their
-//! energy falls as they carry their flux along; inside the body nothing is deformed. It holds with eddy currents as well: in
-//! harmonics it is the time average. Where the body goes on beyond an outer face, its nodes there keep to the face, so that a force
+//! energy falls as they carry their flux along; inside the body nothing is deformed, so that a region which its surface stands for
+//! need not have elements. It holds with eddy currents as well: in harmonics it is the time average. Where the body goes on beyond an outer face, its nodes there keep to the face, so that a force
 //! is that on the free faces of the meshed part. The layer must be without current, magnetisation and conductivity, and where space
 //! is what it is in the mesh: not in the shell that stands for all of it.
 
@@ -23,6 +23,7 @@ use crate::error::SolverError;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
 use crate::solution::FieldSolution;
+use crate::surface::Conductor;
 
 /// A component of force or torque: the work per unit of a rigid motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,11 +73,11 @@ pub struct Force {
 }
 
 impl Force {
-    /// The force on the body that some regions make up.
+    /// The force on the body that some regions make up, meshed or replaced by their surfaces.
     ///
     /// # Errors
     /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not
-    /// free, [`SolverError::TouchesConductor`] where they end at the surface of one, [`SolverError::ForceInShell`] where they or the body are in the shell of open space.
+    /// free, [`SolverError::TouchesConductor`] where they end at the surface of another one, [`SolverError::ForceInShell`] where they or the body are in the shell of open space.
     pub fn new(
         model: &FieldModel,
         mesh: &Mesh,
@@ -87,8 +88,14 @@ impl Force {
         let topology = model.topology();
         let region_of = |e: ElementId| topology.region_of()[e.index()];
         let inside = |e: &ElementId| regions.contains(&region_of(*e));
-        let of_body = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
-        let mut body: BTreeMap<NodeId, Vec<Point>> = of_body.map(|node| (node, Vec::new())).collect();
+        let is_of_body = |conductor: &&Conductor| {
+            topology.region(&conductor.name).is_ok_and(|region| regions.contains(&region))
+        };
+        let (own_surfaces, others): (Vec<_>, Vec<_>) = model.conductors().iter().partition(is_of_body);
+        let meshed = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
+        let replaced = own_surfaces.into_iter().flat_map(|own| own.surface.iter().flatten().copied());
+        let mut body: BTreeMap<NodeId, Vec<Point>> =
+            meshed.chain(replaced).map(|node| (node, Vec::new())).collect();
         let is_own = |node: &NodeId| body.contains_key(node);
         let natural = natural(model, mesh, is_own)?;
         for (node, normal) in conditioned(model).chain(natural) {
@@ -125,8 +132,7 @@ impl Force {
             }
         }
         // Current flows in the surfaces that stand for conductors, which have no element.
-        let faces =
-            model.conductors().iter().flat_map(|own| own.surface.iter().map(move |face| (own, *face)));
+        let faces = others.into_iter().flat_map(|own| own.surface.iter().map(move |face| (own, *face)));
         for (conductor, face) in faces {
             if face.iter().any(|node| body.contains_key(node)) {
                 return Err(SolverError::TouchesConductor {
