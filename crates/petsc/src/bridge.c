@@ -36,7 +36,7 @@ static PetscErrorCode on_error(MPI_Comm comm, int line, const char *function, co
         snprintf(message, sizeof message, "%s (PETSc, %s)", text, function);
     }
     /* One rank alone may be out of memory, and the others wait for it in what all do together. */
-    if (code == PETSC_ERR_MEM) {
+    if (code == PETSC_ERR_MEM && fm_size() > 1) {
         fprintf(stderr, "error: rank %d of %d is out of memory: %s\n", fm_rank(), fm_size(), message);
         fm_abort(4);
     }

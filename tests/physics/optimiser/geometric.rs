@@ -1,13 +1,13 @@
 //! Volume and thickness of a plate; Taylor remainders of both are in `gradient`.
 
-use fluxmorph::build::Setup;
+use fluxmorph::build::{Mode, Setup, set_up};
 use fluxmorph_optimizer::constraint::{Constraint, Limit, Quantity};
 use fluxmorph_optimizer::geometric::{MARGIN, ThicknessBound, ThicknessLimit};
 use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_solver::functional::Volume;
 
 use crate::problems::variables;
-use crate::support::setup;
+use crate::support::{self, parsed, repository_text, setup};
 
 fn shield(overrides: &[&str]) -> Setup {
     setup("shield_quick.toml", overrides)
@@ -88,13 +88,20 @@ fn a_uniform_plate_meets_its_limit_by_the_margin() {
 
 #[test]
 fn linear_limits_and_bounds_keep_the_smooth_bound() {
-    let both = ["design.surface=[\"plate_bottom\", \"plate_top\"]", "design.direction=\"normal\""];
-    for (overrides, has_limits) in [
-        (MESHED.to_vec(), false),
-        ([&MESHED[..], &["design.grid=[5, 9]"]].concat(), true),
-        ([&MESHED[..], &both].concat(), true),
-    ] {
-        let mut setup = shield(&overrides);
+    let (grid, surface) = ("grid = [7, 13]\n", "surface = \"plate_bottom\"\ndirection = [0.0, 0.0, -1.0]");
+    let both = "surface = [\"plate_bottom\", \"plate_top\"]\ndirection = \"normal\"";
+    let meshed = [
+        ("model = \"impedance\"", "model = \"volume\""),
+        ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
+    ];
+    let free = (grid, "filter_radius = 0\n");
+    for (changes, has_limits) in
+        [(&[free][..], false), (&[(grid, "grid = [5, 9]\n")], true), (&[free, (surface, both)], true)]
+    {
+        let text = repository_text("configs/shield_quick.toml");
+        let (config, source) = parsed(&support::changed(&text, &[&meshed[..], changes].concat()));
+        let mut setup =
+            set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|error| panic!("{error}"));
         let count = variables(&setup.problem);
         for (limit, step) in [(ThicknessLimit::Minimum(0.008), -1e-4), (ThicknessLimit::Maximum(0.012), 1e-4)]
         {
@@ -104,7 +111,7 @@ fn linear_limits_and_bounds_keep_the_smooth_bound() {
             let (lower, upper) = (shape.lower().to_vec(), shape.upper().to_vec());
             let excess = |p: &[f64]| {
                 let limits = bound.limits(p).expect("linear ones");
-                assert_eq!(!limits.is_empty(), has_limits, "{overrides:?}");
+                assert_eq!(!limits.is_empty(), has_limits, "{changes:?}");
                 let beyond = |k: usize| (lower[k] - p[k]).max(p[k] - upper[k]);
                 let of_bounds = (0..count).map(beyond).fold(f64::NEG_INFINITY, f64::max);
                 limits.iter().map(|(c, _)| *c).fold(of_bounds, f64::max)
@@ -117,7 +124,7 @@ fn linear_limits_and_bounds_keep_the_smooth_bound() {
             let (beyond, _) = evaluate(&setup, &bound, &p);
             p.iter_mut().enumerate().for_each(|(k, p)| *p -= step * (1.0 + 0.3 * (k as f64).sin()));
             let (within, _) = evaluate(&setup, &bound, &p);
-            println!("{overrides:?}, {limit:?}: {within} {beyond}");
+            println!("{changes:?}, {limit:?}: {within} {beyond}");
             assert!(within <= 0.0 && within > -1e-3 && within < beyond, "{within} {beyond}");
             // The derivatives of the limits are those of their values.
             let q: Vec<f64> = p.iter().enumerate().map(|(k, p)| p + 1e-3 * (k as f64).cos()).collect();

@@ -47,12 +47,10 @@ table! {
         max_refinements: usize = integer(1, MOST_REFINEMENTS) => 8;
     }
     check = Accuracy::check;
-    rules = |rules| rules
-        .add(json!({
-            "if": { "required": ["tolerance"] },
-            "then": { "properties": { "estimate": { "const": true }, "tolerance": { "exclusiveMaximum": 1 } } },
-        }))
-        .needs("max_refinements", &["tolerance"]);
+    rules = |rules| rules.add(json!({
+        "if": { "required": ["tolerance"] },
+        "then": { "properties": { "estimate": { "const": true }, "tolerance": { "exclusiveMaximum": 1 } } },
+    }));
 }
 
 impl Accuracy {
@@ -61,13 +59,6 @@ impl Accuracy {
             let message =
                 format!("`accuracy.tolerance` is {tolerance}, as much as the objective itself or more");
             section.wrong("tolerance", message, "less than 1; with its unit it is a share, like \"2 %\"");
-        }
-        if section.has("max_refinements") && !section.has("tolerance") {
-            section.wrong(
-                "max_refinements",
-                "`accuracy.max_refinements` limits what `tolerance` asks for, and there is none",
-                "a `tolerance` beside it, like \"2 %\", or no `max_refinements`",
-            );
         }
         if self.tolerance.is_some() && self.estimate == Some(false) {
             section.clash(

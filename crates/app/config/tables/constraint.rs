@@ -23,8 +23,8 @@ table! {
     /// warning.
     ///
     /// The bounds on a thickness are on the safe side by a hundredth of them: the true least thickness is a little greater, the
-    /// greatest a little smaller. Where the opposite face stands still and the initial design keeps them they are bounds on the
-    /// variables, which `result.json` shows; elsewhere one smooth function of all places, which searches are slow along. With
+    /// greatest a little smaller. A search keeps them as bounds on the variables or as linear limits at every node, up to a
+    /// thousand of these; where the mesh motion decides about the opposite face, as one smooth function, and is slow along it. With
     /// both `minimum` and `maximum` one entry makes two constraints, with `_minimum` and `_maximum` behind their names.
     ///
     /// ```toml

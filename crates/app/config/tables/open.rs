@@ -29,7 +29,7 @@ table! {
         layers: usize = integer(1, MOST_LAYERS) => 4;
     }
     check = Open::check;
-    rules = |rules| rules.exactly_one(&["surfaces", "region"]).not_both(["region", "layers"]);
+    rules = |rules| rules.exactly_one(&["surfaces", "region"]);
 }
 
 impl Open {
@@ -49,11 +49,6 @@ impl Open {
                 ["region", "surfaces"],
                 "the shell is a region of the mesh and put around it at once".to_owned(),
                 "one of the two",
-            ),
-            [true, false] if section.has("layers") => section.wrong(
-                "layers",
-                "`open.layers` are those of a shell that is put around the mesh, and `region` has its own",
-                "no `layers`, or `surfaces` in place of `region`",
             ),
             _ => {}
         }

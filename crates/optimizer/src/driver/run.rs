@@ -123,11 +123,17 @@ impl<'a> Run<'a> {
 
     /// The constraints that the method is not shown, ascending, and the number of limits in their place.
     pub(super) fn replaced(&self) -> (Vec<usize>, usize) {
-        let p = self.shape().initial();
         let constraints = self.problem.constraints().iter().enumerate();
-        let replaced = constraints.filter_map(|(k, own)| Some((k, own.limits(p)?.len())));
+        let replaced = constraints.filter_map(|(k, own)| Some((k, own.limit_count()?)));
         let (replaced, counts): (Vec<_>, Vec<usize>) = replaced.unzip();
         (replaced, counts.iter().sum())
+    }
+
+    /// How far the best design, which counts by the constraints themselves, is beyond the limits in their place: a search from it begins
+    /// within.
+    pub(super) fn leeway(&self) -> Vec<f64> {
+        let best = self.best.as_ref().filter(|best| best.violation == 0.0);
+        best.map_or_else(Vec::new, |best| best.sample.limits.iter().map(|(c, _)| c.max(0.0)).collect())
     }
 
     /// Terms of a worst case; none of a sum.

@@ -93,9 +93,10 @@ impl<'a> Search<'a> {
     /// Runs the method once within the trust region, from the best design.
     pub(super) fn minimise(&mut self, run: &mut Run<'_>) -> Ended {
         let [lower, upper] = self.trust.bounds(run.shape());
-        let restores = self.is_restoring && run.violates();
         let (replaced, limits) = run.replaced();
         let shown = run.constraint_count() - replaced.len() + limits;
+        let restores = self.is_restoring && run.violates() && shown > 0;
+        let leeway = run.leeway();
         let of_problem = if restores { shown } else { 0 };
         let minimisation = Minimisation {
             algorithm: self.settings.algorithm,
@@ -109,7 +110,9 @@ impl<'a> Search<'a> {
         };
         let before = (run.evaluations(), run.incumbent_values());
         let outcome = minimise(&minimisation, &run.centre(), |p| {
-            match run.evaluate(p)?.with_limits(&replaced, run.constraint_count()) {
+            let mut sample = run.evaluate(p)?;
+            sample.limits.iter_mut().zip(&leeway).for_each(|((c, _), leeway)| *c -= leeway);
+            match sample.with_limits(&replaced, run.constraint_count()) {
                 _ if restores && !run.violates() => Err(Stop::CutShort),
                 sample if restores => Ok(with_violation_as_objective(sample, of_problem)),
                 sample => Ok(sample),
@@ -157,7 +160,7 @@ impl<'a> Search<'a> {
     /// After a method that ended by itself.
     fn after_ending(&self, run: &mut Run<'_>, ending: Ending, gained: bool, evaluations: usize) -> NextStep {
         let has_entered = ending == Ending::Entered;
-        if has_entered && (!run.violates() || self.is_restoring && gained) {
+        if has_entered && gained && (!run.violates() || self.is_restoring) {
             return NextStep::SearchOn;
         }
         if run.violates() && !self.is_restoring {

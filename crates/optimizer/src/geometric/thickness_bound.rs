@@ -1,8 +1,9 @@
 //! Least and greatest thickness along the design's direction, as one smooth constraint.
 //!
-//! A limit on the thickness at every design node is as many constraints as the surface has nodes. MMA and SLSQP carry dense arrays of
-//! that number times the number of variables and solve a dual problem in it. So the limits are gathered in the Kreisselmeier–Steinhauser function (G. Kreisselmeier, R. Steinhauser,
-//! IFAC Proceedings 12 (1979) 113–117): of `g_i = t_min − t_i`, or `t_i − t_max`,
+//! A limit on the thickness at every design node is as many constraints as the surface has nodes. MMA and SLSQP carry dense
+//! arrays of that number times the number of variables and solve a dual problem in it. So the limits are gathered in the
+//! Kreisselmeier–Steinhauser function (G. Kreisselmeier, R. Steinhauser, IFAC Proceedings 12 (1979) 113–117): of `g_i = t_min − t_i`,
+//! or `t_i − t_max`,
 //!
 //! `KS = (1/ρ) ln Σ exp(ρ g_i)`, `max g_i ≤ KS ≤ max g_i + ln n / ρ`.
 //!
@@ -24,6 +25,9 @@ use crate::problem::Shape;
 /// What the smooth bound gives away at most, as a share of the limit: below what a workshop holds, and still smooth over
 /// the change of thickness of one optimisation step.
 pub const MARGIN: f64 = 0.01;
+
+/// Of what the smooth function gives away, for linear limits that a method keeps but for the tolerance of its dual problem.
+const SAFETY: f64 = 1.02;
 
 /// Most linear limits that a method is shown: its dual problem has a variable for each.
 const MOST_LINEAR_LIMITS: usize = 1000;
@@ -78,6 +82,11 @@ impl ThicknessBound {
         self.bound
     }
 
+    /// The number of what a method is shown in place of the function.
+    pub fn limit_count(&self) -> Option<usize> {
+        self.linear.as_ref().map(Vec::len)
+    }
+
     /// What a method is shown at a design in place of the function: `c ≤ 0` as a share of the limit, with its derivatives. Nothing where
     /// bounds on the variables keep the limit; `None` where there is nothing in its place.
     pub fn limits(&self, p: &[f64]) -> Option<Vec<(f64, Vec<f64>)>> {
@@ -115,16 +124,16 @@ impl ThicknessBound {
         self.linear = Some(others);
     }
 
-    /// The limit at every node that moves, on the safe side by what the smooth function gives away; `None` where the elastic map decides
-    /// about a node opposite.
+    /// The limit at every node that moves, on the safe side by a little more than what the smooth function gives away; `None` where the
+    /// elastic map decides about a node opposite, or a node that stands still breaks it.
     fn linear_limits(&self, shape: &Shape) -> Option<Vec<LinearLimit>> {
         let (thickness, surface) = (shape.thickness()?, shape.surface());
         let map = shape.motion().map();
         let mut limits = Vec::new();
         for ((_, initial), (_, wall)) in thickness.at_nodes().zip(thickness.walls(surface, |_| [0.0; 3])) {
             let (sign, room) = match self.bound {
-                ThicknessLimit::Minimum(limit) => (1.0, initial - limit - given_away(limit)),
-                ThicknessLimit::Maximum(limit) => (-1.0, limit - given_away(limit) - initial),
+                ThicknessLimit::Minimum(limit) => (1.0, initial - limit - SAFETY * given_away(limit)),
+                ThicknessLimit::Maximum(limit) => (-1.0, limit - SAFETY * given_away(limit) - initial),
             };
             let mut slopes: BTreeMap<usize, f64> = BTreeMap::new();
             for (node, derivative) in wall.derivatives {
@@ -140,8 +149,11 @@ impl ThicknessBound {
                 }
             }
             let slopes: Vec<_> = slopes.into_iter().filter(|(_, slope)| *slope != 0.0).collect();
-            if !slopes.is_empty() {
-                limits.push(LinearLimit { room, slopes });
+            match slopes.is_empty() {
+                // Nothing keeps it there.
+                true if room < 0.0 => return None,
+                true => {}
+                false => limits.push(LinearLimit { room, slopes }),
             }
         }
         Some(limits)

@@ -26,6 +26,17 @@ const LARGEST: f64 = 1e100;
 /// above what the conservative methods leave of rounding.
 pub const CONSTRAINT_TOLERANCE: f64 = 1e-6;
 
+/// Constraints beyond which their dual problem takes longer than a field.
+const MANY_CONSTRAINTS: usize = 20;
+
+/// Relative tolerance of the dual problem of so many.
+const DUAL_TOLERANCE: f64 = 1e-10;
+
+/// Evaluations of the dual problem at most, in products of a derivative: some seconds; and their bounds.
+const DUAL_WORK: usize = 1_000_000_000;
+const LEAST_DUAL: usize = 500;
+const MOST_DUAL: usize = 100_000;
+
 /// Objective and constraints of one design.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sample {
@@ -261,12 +272,30 @@ pub fn minimise<E: From<Error>>(
         accepted = accepted
             .and_then(|_| library.add_inequality_mconstraint(tolerances.len(), constraints, (), &tolerances));
     }
+    if tolerances.len() > MANY_CONSTRAINTS && settings.algorithm != Algorithm::Slsqp {
+        accepted =
+            accepted.and_then(|_| library.set_local_optimizer(dual_solver(x.len(), tolerances.len())?));
+    }
     if accepted.is_err() {
         return Outcome::Failed("NLopt refuses the bounds, constraints or tolerances");
     }
     let ended = library.optimize(&mut x);
     drop(library);
     bridge.into_inner().outcome(Some(ended))
+}
+
+/// What solves the dual problems of MMA and CCSAQ, with a variable for each constraint, where there are many: less exactly than the
+/// 10⁻¹⁴ of NLopt, and with a limit of its work.
+fn dual_solver(
+    variables: usize,
+    constraints: usize,
+) -> Result<::nlopt::Nlopt<impl ::nlopt::ObjFn<()>, ()>, FailState> {
+    let unasked = |_: &[f64], _: Option<&mut [f64]>, (): &mut ()| 0.0;
+    let mut solver = ::nlopt::Nlopt::new(::nlopt::Algorithm::Mma, variables, unasked, Target::Minimize, ());
+    let most = (DUAL_WORK / (variables * constraints)).clamp(LEAST_DUAL, MOST_DUAL);
+    solver.set_ftol_rel(DUAL_TOLERANCE)?;
+    solver.set_maxeval(most as u32)?;
+    Ok(solver)
 }
 
 /// What NLopt's own word on its end means.

@@ -176,6 +176,9 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
 
 /// `e^(−2jφ)` of the phase `φ`, but for signs, that everything which excites the field has; `None` of several.
 fn phase_of_sources(model: &FieldModel, solution: &FieldSolution) -> Option<c64> {
+    if model.setup().windings.iter().flatten().any(|winding| winding.voltage.is_some()) {
+        return None;
+    }
     let given = model.coils().iter().map(|coil| coil.ampere_turns);
     let driven = currents(model, solution).into_iter().map(|(_, current)| current);
     let is_applied = model.setup().boundaries.iter().any(|(_, own)| matches!(own, Boundary::UniformField(_)));

@@ -3,8 +3,8 @@
 //! A rigid virtual velocity `v` of the body's nodes, zero at all others, deforms the elements that touch the body from outside.
 //! The force is minus the work of Maxwell's stress there, `−∫σ:∇v` ([`crate::element::virtual_work`]), the rate at which their
 //! energy falls as they carry their flux along; inside the body nothing is deformed, so that a region which its surface stands for
-//! need not have elements. It holds with eddy currents as well: in harmonics it is the time average. Where the body goes on beyond an outer face, its nodes there keep to the face, so that a force
-//! is that on the free faces of the meshed part. The layer must be without current, magnetisation and conductivity, and where space
+//! need not have elements. It holds with eddy currents as well: in harmonics it is the time average. Where the body goes on beyond
+//! an outer face, its nodes there keep to the face, so that a force is that on the free faces of the meshed part. The layer must be without current, magnetisation and conductivity, and where space
 //! is what it is in the mesh: not in the shell that stands for all of it.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -77,7 +77,8 @@ impl Force {
     ///
     /// # Errors
     /// [`SolverError::NoLayer`] for a body without elements around it, [`SolverError::Layer`] where these are not
-    /// free, [`SolverError::TouchesConductor`] where they end at the surface of another one, [`SolverError::ForceInShell`] where they or the body are in the shell of open space.
+    /// free, [`SolverError::TouchesConductor`] where they end at the surface of another one, [`SolverError::ForceInShell`] where they
+    /// or the body are in the shell of open space.
     pub fn new(
         model: &FieldModel,
         mesh: &Mesh,
@@ -91,16 +92,10 @@ impl Force {
         let is_of_body = |conductor: &&Conductor| {
             topology.region(&conductor.name).is_ok_and(|region| regions.contains(&region))
         };
-        let (own_surfaces, others): (Vec<_>, Vec<_>) = model.conductors().iter().partition(is_of_body);
+        let (replaced, others): (Vec<_>, Vec<_>) = model.conductors().iter().partition(is_of_body);
         let meshed = topology.elements().filter(inside).flat_map(|e| topology.tet(e));
-        let replaced = own_surfaces.into_iter().flat_map(|own| own.surface.iter().flatten().copied());
-        let mut body: BTreeMap<NodeId, Vec<Point>> =
-            meshed.chain(replaced).map(|node| (node, Vec::new())).collect();
-        let is_own = |node: &NodeId| body.contains_key(node);
-        let natural = natural(model, mesh, is_own)?;
-        for (node, normal) in conditioned(model).chain(natural) {
-            body.entry(node).and_modify(|held| extend(held, normal, INDEPENDENT));
-        }
+        let of_surfaces = replaced.into_iter().flat_map(|own| own.surface.iter().flatten().copied());
+        let body = held_nodes(model, mesh, meshed.chain(of_surfaces))?;
         let around = body.keys().flat_map(|&node| topology.elements_around(node)).copied();
         let layer: BTreeSet<ElementId> = around.filter(|e| !inside(e)).collect();
         if layer.is_empty() {
@@ -132,15 +127,14 @@ impl Force {
             }
         }
         // Current flows in the surfaces that stand for conductors, which have no element.
-        let faces = others.into_iter().flat_map(|own| own.surface.iter().map(move |face| (own, *face)));
-        for (conductor, face) in faces {
-            if face.iter().any(|node| body.contains_key(node)) {
-                return Err(SolverError::TouchesConductor {
-                    body: name.to_owned(),
-                    conductor: conductor.name.clone(),
-                    place: centroid(face.map(|node| mesh.point(node))),
-                });
-            }
+        let touches = |(_, face): &(&Conductor, [NodeId; 3])| face.iter().any(|node| body.contains_key(node));
+        let mut faces = others.into_iter().flat_map(|own| own.surface.iter().map(move |face| (own, *face)));
+        if let Some((conductor, face)) = faces.find(touches) {
+            return Err(SolverError::TouchesConductor {
+                body: name.to_owned(),
+                conductor: conductor.name.clone(),
+                place: centroid(face.map(|node| mesh.point(node))),
+            });
         }
         Ok(Self { layer: layer.into_iter().collect(), body, motion })
     }
@@ -212,6 +206,20 @@ fn virtual_work(
         (0..3).for_each(|d| position[d] += more[d]);
     }
     (rate, by_velocities)
+}
+
+/// The nodes of a body, with the directions in which they cannot move.
+fn held_nodes(
+    model: &FieldModel,
+    mesh: &Mesh,
+    nodes: impl Iterator<Item = NodeId>,
+) -> Result<BTreeMap<NodeId, Vec<Point>>, SolverError> {
+    let mut body: BTreeMap<NodeId, Vec<Point>> = nodes.map(|node| (node, Vec::new())).collect();
+    let natural = natural(model, mesh, |node| body.contains_key(node))?;
+    for (node, normal) in conditioned(model).chain(natural) {
+        body.entry(node).and_modify(|held| extend(held, normal, INDEPENDENT));
+    }
+    Ok(body)
 }
 
 /// The nodes on conditioned surfaces with the normals of these, a node once for each.
