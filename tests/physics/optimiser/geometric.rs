@@ -93,6 +93,7 @@ fn linear_limits_and_bounds_keep_the_smooth_bound() {
     let meshed = [
         ("model = \"impedance\"", "model = \"volume\""),
         ("region = \"remesh\"", "region = [\"plate\", \"remesh\"]"),
+        ("lower = \"-5 mm\"", "lower = \"-4 mm\""),
     ];
     let free = (grid, "filter_radius = 0\n");
     for (changes, has_limits) in
