@@ -28,6 +28,10 @@ static void say(const char *text) {
     }
 }
 
+int fm_rank(void);
+int fm_size(void);
+void fm_abort(int code);
+
 /* PETSc reports an error once in every function on the way back: the first text is the cause. */
 static PetscErrorCode on_error(MPI_Comm comm, int line, const char *function, const char *file, PetscErrorCode code,
                                PetscErrorType type, const char *text, void *context) {
@@ -36,7 +40,8 @@ static PetscErrorCode on_error(MPI_Comm comm, int line, const char *function, co
         snprintf(message, sizeof message, "%s (PETSc, %s)", text, function);
     }
     /* One rank alone may be out of memory, and the others wait for it in what all do together. */
-    if (code == PETSC_ERR_MEM && fm_size() > 1) {
+    int is_memory = code == PETSC_ERR_MEM || (function != NULL && strstr(function, "Malloc") != NULL);
+    if (is_memory && fm_size() > 1) {
         fprintf(stderr, "error: rank %d of %d is out of memory: %s\n", fm_rank(), fm_size(), message);
         fm_abort(4);
     }
