@@ -82,12 +82,17 @@ impl Quantity {
 }
 
 impl Constraint {
-    /// The number of its [limits](Self::limits).
-    pub fn limit_count(&self) -> Option<usize> {
+    /// What limits the thickness; `None` of another quantity.
+    fn thickness(&self) -> Option<&geometric::ThicknessBound> {
         match &self.quantity {
-            Quantity::Thickness { measure, .. } => measure.limit_count(),
+            Quantity::Thickness { measure, .. } => Some(measure),
             Quantity::Field(_) | Quantity::Volume(_) => None,
         }
+    }
+
+    /// The number of its [limits](Self::limits).
+    pub fn limit_count(&self) -> Option<usize> {
+        self.thickness()?.limit_count()
     }
 
     /// Limits that a method is shown at a design in its place, each `c ≤ 0` of order one with its derivatives, as [`ThicknessBound::limits`];
@@ -95,10 +100,7 @@ impl Constraint {
     ///
     /// [`ThicknessBound::limits`]: geometric::ThicknessBound::limits
     pub fn limits(&self, p: &[f64]) -> Option<Vec<(f64, Vec<f64>)>> {
-        match &self.quantity {
-            Quantity::Thickness { measure, .. } => measure.limits(p),
-            Quantity::Field(_) | Quantity::Volume(_) => None,
-        }
+        self.thickness()?.limits(p)
     }
 
     /// Value and gradient of a quantity of the shape alone; `None` for one of the field.

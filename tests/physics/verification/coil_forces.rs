@@ -33,13 +33,17 @@ const PERMEABILITY: f64 = 1000.0;
 /// How far the mesh reaches [m]: thirteen mean radii.
 const FAR: f64 = 0.29;
 
+/// Filaments that stand for a winding: their radii and heights over its middle [m].
+fn filaments() -> Vec<[f64; 2]> {
+    let [inner, width, height] = WINDING;
+    let n = 6;
+    let part = |i: usize, size: f64| size * ((i as f64 + 0.5) / n as f64 - 0.5);
+    (0..n * n).map(|k| [inner + 0.5 * width + part(k / n, width), part(k % n, height)]).collect()
+}
+
 /// The force of attraction [N] of two such coils with currents in the same sense, `2 HEIGHT` apart.
 fn exact() -> f64 {
-    let [inner, width, height] = WINDING;
-    let (n, angles) = (6, 240);
-    let part = |i: usize, size: f64| size * ((i as f64 + 0.5) / n as f64 - 0.5);
-    let filaments: Vec<[f64; 2]> =
-        (0..n * n).map(|k| [inner + 0.5 * width + part(k / n, width), part(k % n, height)]).collect();
+    let (filaments, angles) = (filaments(), 240);
     let mut sum = 0.0;
     for [a, lower] in &filaments {
         for [b, upper] in &filaments {
@@ -59,9 +63,7 @@ fn exact() -> f64 {
 /// The mean force [N] that pushes the coil off a half space whose waves are reflected with a factor, under an amplitude of
 /// `CURRENT`.
 fn pushed_off(reflected: impl Fn(f64) -> c64) -> f64 {
-    let [inner, width, height] = WINDING;
-    let n = 6;
-    let part = |i: usize, size: f64| size * ((i as f64 + 0.5) / n as f64 - 0.5);
+    let filaments = filaments();
     // The mean over the circle is exact to the last digits.
     let bessel = |x: f64| {
         let angles = (0..240).map(|k| PI * (f64::from(k) + 0.5) / 240.0);
@@ -70,11 +72,8 @@ fn pushed_off(reflected: impl Fn(f64) -> c64) -> f64 {
     let step = 2.0;
     let waves = (1..1000).map(|i| {
         let k = step * f64::from(i);
-        let of_filament = |own: usize| {
-            let (radius, z) = (inner + 0.5 * width + part(own / n, width), HEIGHT + part(own % n, height));
-            radius * bessel(k * radius) * (-k * z).exp()
-        };
-        let of_coil = (0..n * n).map(of_filament).sum::<f64>() / (n * n) as f64;
+        let of_filament = |[radius, z]: &[f64; 2]| radius * bessel(k * radius) * (-k * (HEIGHT + z)).exp();
+        let of_coil = filaments.iter().map(of_filament).sum::<f64>() / filaments.len() as f64;
         -reflected(k).re * k * of_coil * of_coil
     });
     0.5 * PI * VACUUM_PERMEABILITY * CURRENT * CURRENT * step * waves.sum::<f64>()

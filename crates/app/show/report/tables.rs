@@ -158,11 +158,11 @@ fn constraints(result: &RunResult, constraints: &[Constraint]) -> Markup {
     let checked: &[ConstraintResult] = checked.map_or(&[], |found| &found.constraints);
     let verdict = |c: &ConstraintResult| if c.satisfied { "satisfied" } else { "violated" };
     let row = |c: &ConstraintResult| {
-        let (unit, factor) = constraint_unit(&c.name, constraints);
+        let limit = constraints.iter().find(|own| own.is_called(&c.name)).map(|own| &own.limit);
+        let (unit, factor) = constraint_unit(limit);
         let on_other = checked.iter().find(|own| own.name == c.name);
         let shown = |v: f64| format!("{} {unit}", number(factor * v, 5));
-        let own = constraints.iter().find(|own| own.is_called(&c.name));
-        let is_shared = own.is_some_and(|own| own.limit.is_share_of_initial());
+        let is_shared = limit.is_some_and(Limit::is_share_of_initial);
         // Its own bound there is a share of another initial value.
         let of_bound = |own: &ConstraintResult| {
             if is_shared { format!(" of {}", shown(own.bound)) } else { String::new() }
@@ -186,8 +186,8 @@ fn constraints(result: &RunResult, constraints: &[Constraint]) -> Markup {
 }
 
 /// The unit that a constraint is shown in, and its number in one of SI.
-fn constraint_unit(name: &str, constraints: &[Constraint]) -> (&'static str, f64) {
-    match constraints.iter().find(|own| own.is_called(name)).map(|own| &own.limit) {
+fn constraint_unit(limit: Option<&Limit>) -> (&'static str, f64) {
+    match limit {
         Some(Limit::Functional { functional, .. }) => match functional.kind {
             ObjectiveKind::Volume => ("cm³", 1e6),
             _ => (functional.dimension().shown_unit(), 1.0),

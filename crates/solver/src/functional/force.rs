@@ -4,8 +4,9 @@
 //! The force is minus the work of Maxwell's stress there, `−∫σ:∇v` ([`crate::element::virtual_work`]), the rate at which their
 //! energy falls as they carry their flux along; inside the body nothing is deformed, so that a region which its surface stands for
 //! need not have elements. It holds with eddy currents as well: in harmonics it is the time average. Where the body goes on beyond
-//! an outer face, its nodes there keep to the face, so that a force is that on the free faces of the meshed part. The layer must be without current, magnetisation and conductivity, and where space
-//! is what it is in the mesh: not in the shell that stands for all of it.
+//! an outer face, its nodes there keep to the face, so that a force is that on the free faces of the meshed part. The layer must be
+//! without current, magnetisation and conductivity, and where space is what it is in the mesh: not in the shell that stands for all
+//! of it.
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
