@@ -429,22 +429,14 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
     faults
 }
 
-/// A solid conductor that does not conduct, or whose circuit would not be linear.
+/// A solid conductor that does not conduct.
 fn solid_fault(config: &Config, source: &SourceMap, coil: usize, region: &str) -> Option<Diagnostic> {
-    if material(config, region).conductivity == 0.0 {
-        let path = format!("coils[{coil}].region");
-        let fault =
-            source.diagnostic(&path, format!("`{region}` is a solid conductor, but does not conduct"));
-        return Some(
-            fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""),
-        );
+    if material(config, region).conductivity > 0.0 {
+        return None;
     }
-    let curved = config.saturating_region().filter(|_| config.alternates())?;
-    let message = format!(
-        "`{region}` is a solid conductor, and `{curved}` has a B–H curve: no circuit of both above 0 Hz"
-    );
-    let fault = source.diagnostic(&format!("coils[{coil}].conductor"), message);
-    Some(fault.expected("a relative_permeability for the iron, conductor = \"stranded\", or frequency = 0"))
+    let path = format!("coils[{coil}].region");
+    let fault = source.diagnostic(&path, format!("`{region}` is a solid conductor, but does not conduct"));
+    Some(fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""))
 }
 
 /// Remanence of every region [T], by `RegionId`; zero where there is no magnet.

@@ -82,10 +82,6 @@ fn drive_fault(
         "at 0 Hz no resistance limits the current"
     } else if is_static && coil.series_capacitance.is_some() {
         "at 0 Hz a capacitance passes no current"
-    } else if !is_static && config.saturating_region().is_some() {
-        let message = "beside a B–H curve no voltage drives a current above 0 Hz: its circuit is not linear";
-        let expected = "ampere_turns instead, a relative_permeability for the iron, or a frequency of 0 Hz";
-        return Some(source.diagnostic(&path, message).expected(expected));
     } else {
         return None;
     };

@@ -4,6 +4,7 @@
 //! Walls are the sides of the mesh, whatever their names and conditions, but planes of symmetry: those that coils, matter or what is
 //! observed reach; and those that flux passes at a right angle, unless such a plane, or one that is reached, lies opposite.
 
+mod return_path;
 mod site;
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -62,6 +63,9 @@ pub(crate) struct Truncation {
     /// In which so many of these are near.
     #[serde(skip)]
     near: f64,
+    /// Planes that a device goes through, and that flux may not leave beside it.
+    #[serde(skip)]
+    confined: Option<[String; 2]>,
 }
 
 /// What a side of the mesh may stand for.
@@ -184,7 +188,9 @@ impl Truncation {
         let source_size_m = size(&whole, &places, &planes_of_symmetry(mesh, &sides, rounding));
         let near = if is_plane_device(&sides) { NEAR_IN_A_PLANE } else { NEAR };
         let (surface, at_m) = name(&hull, side);
-        Some(Self { surface, at_m, distance_m, source_size_m, near })
+        let confined = return_path::confined(&sides, model, mesh);
+        let confined = confined.map(|planes| planes.map(|plane| name(&hull, plane).0));
+        Some(Self { surface, at_m, distance_m, source_size_m, near, confined })
     }
 
     /// Its name in marks or not, with the place of a side that has none.
@@ -193,8 +199,15 @@ impl Truncation {
         format!("{mark}{}{mark}{place}", self.surface)
     }
 
-    /// What no error bar counts, where the wall is near.
+    /// What no error bar counts, where walls send flux back, however far they are, or are near.
     pub(crate) fn described(&self) -> Option<String> {
+        if let Some([first, second]) = &self.confined {
+            return Some(format!(
+                "between the planes `{first}` and `{second}`, which flux passes, the sides are flux-parallel all round: they send \
+                 back beside the device all that passes it, however far they are, and no error bar counts that. Where the device goes \
+                 on alike beyond both planes with open space around it, as a long coil does, leave the far sides without a condition"
+            ));
+        }
         let Self { distance_m, source_size_m, near, .. } = self;
         let ratio = distance_m / source_size_m;
         (ratio < *near).then(|| {
@@ -417,6 +430,7 @@ mod tests {
             distance_m,
             source_size_m: 0.1,
             near,
+            confined: None,
         };
         let text = at(0.29, NEAR).described().expect("it is near");
         assert!(

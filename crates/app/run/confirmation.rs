@@ -88,6 +88,15 @@ impl Session<'_> {
         Estimator::new((self.config, self.source), (&self.setup.problem, &self.setup.full_mesh))
     }
 
+    /// Whether a run that ends by itself has its errors estimated.
+    pub(super) fn wants_errors(&self) -> bool {
+        let is_asked_for =
+            self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
+        let constraints = self.setup.problem.constraints();
+        let is_of_field = || constraints.iter().any(|own| own.quantity.is_of_field());
+        is_asked_for && (self.has_field_objective() || is_of_field())
+    }
+
     /// The estimated errors at the initial and the best design of a run, of which the last is `at_best` where that is known.
     pub(super) fn estimate_errors(
         &self,
@@ -96,11 +105,7 @@ impl Session<'_> {
         at_best: Option<Estimate>,
         observer: &mut dyn Observer,
     ) -> Option<(ErrorEstimate, Estimate)> {
-        let is_wanted =
-            self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
-        let is_of_field = self.has_field_objective()
-            || self.setup.problem.constraints().iter().any(|own| own.quantity.is_of_field());
-        if self.is_cut_short(stop_reason) || !is_wanted || !is_of_field {
+        if self.is_cut_short(stop_reason) || !self.wants_errors() {
             return None;
         }
         let (best, mut estimator) = (&best.analysis, self.estimator());

@@ -414,6 +414,7 @@ impl Session<'_> {
             FreshMesh::of(self.config, &self.setup.problem)
         };
         let sizes = Sizes::of(&self.setup.problem);
+        let lacks_errors = known.errors.is_none() && self.wants_errors();
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
@@ -436,7 +437,7 @@ impl Session<'_> {
             result.accuracy = self.accuracy((objective, stop_reason, keeps_all), meshes, known, observer);
             let is_measured = |own: &CurvedFacets| own.change.is_some();
             let facets = result.accuracy.as_ref().and_then(|accuracy| accuracy.facets.as_ref());
-            if !facets.is_none_or(is_measured) && (self.interrupted)() {
+            if (lacks_errors || !facets.is_none_or(is_measured)) && (self.interrupted)() {
                 result.status = RunStatus::Interrupted;
             }
         }

@@ -13,6 +13,7 @@ use fluxmorph_optimizer::objective::{Combination, Term};
 use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Measured, Problem, Shape, Timings};
 use fluxmorph_remesh::Moved;
 use fluxmorph_solver::circuit::{self, CoilTerminals, Terminals};
+use fluxmorph_solver::functional::rounding_of_main;
 use fluxmorph_solver::linear::Method;
 use fluxmorph_solver::multipole::Harmonic;
 use fluxmorph_solver::{FieldModel, FieldSolution, Functional, PointsOf, SolverError, saturation};
@@ -128,10 +129,11 @@ impl Session<'_> {
             let main = multipole::main_terms(set);
             let of_main = coefficients.iter().filter(|(term, _)| main.contains(term));
             let reference = of_main.map(|(_, c)| c.norm_sqr()).sum::<f64>().sqrt();
+            let is_there = reference > 0.0 && rounding_of_main(&main, &coefficients).is_none();
             let term = |(term, c): &(Harmonic, c64)| HarmonicResult {
                 name: term.to_string(),
                 value_t: amplitude(*c, model.angular_frequency()),
-                units: (reference > 0.0).then(|| 1e4 * c.norm() / reference),
+                units: is_there.then(|| 1e4 * c.norm() / reference),
             };
             MultipoleResult { name, radius_m: set.radius, terms: coefficients.iter().map(term).collect() }
         };

@@ -6,6 +6,10 @@
 //! the derivative over the phases, the part of it that such a matrix can hold. With `∂F/∂u` as of a linear problem,
 //! `dF = 2 Re(dᵀ du)`, the adjoint law is the conjugate of the derivative along the conjugate: the same number `Re Lᵀ dH`, for
 //! the derivative is symmetric.
+//!
+//! Circuits stay linear. Their unknowns stand behind the field's, and a state on the way obeys their equations: the start is one that
+//! does, steps keep to them, and what GMRES sees are the rows of the field alone. Of inductive circuits the residual along a step still
+//! grows with its length: `Re dᴴF δ = −L_s|δ|²`; a capacitance in series may have several states beside iron (ferroresonance).
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::scalar::{axpy, norm, ordered_sum};
@@ -13,12 +17,13 @@ use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use rayon::prelude::*;
 
 use crate::bh::{PhasorLaw, Tangent};
+use crate::circuit::{Equations, Excitation, SolidRows};
 use crate::element::Complex3;
 use crate::element::tensor::MOST_POINTS;
 use crate::error::{NonConvergence, SolverError};
 use crate::line_search;
 use crate::linear::gmres::{self, Ended};
-use crate::linear::{FieldSystem, Left, LinearSolverReport, PreparedSystem, RealLinear};
+use crate::linear::{Left, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
 use crate::newton::{self, NewtonObserver, NewtonProgress};
 use crate::newton_steps::{Descent, MOST_STEPS, StepSystems, Verdict};
@@ -85,47 +90,80 @@ pub(crate) struct HarmonicTangent {
 }
 
 impl HarmonicTangent {
-    /// The derivative along some unknowns.
-    fn apply(&self, side: Side, x: &[c64]) -> Vec<c64> {
-        let mut y = vec![c64::default(); x.len()];
-        self.matrix.mul(x, &mut y);
+    /// The derivative along some unknowns, in the rows of the field; those of circuits are left as zero.
+    fn apply(&self, side: Side, x: &[c64], circuits: Option<&Equations>) -> Vec<c64> {
+        let count = self.model.unknown_count();
+        let mut y = vec![c64::default(); count];
+        self.matrix.mul(&x[..count], &mut y);
+        if let Some(circuits) = circuits {
+            circuits.add_loads(&x[count..].iter().map(|x| -x).collect::<Vec<_>>(), &mut y);
+        }
         // Without the prescribed part of `A`, which does not change.
-        let change = FieldSolution::adjoint(x.to_vec(), LinearSolverReport { iterations: 0, residual: 0.0 });
+        let own = x[..count].to_vec();
+        let change = FieldSolution::adjoint(own, LinearSolverReport { iterations: 0, residual: 0.0 });
         let law = |position: usize, point: usize, b: Complex3| {
             self.points[position][point].map_or_else(Complex3::default, |law| law.derivative(side, b))
         };
         add_strengths(&self.model, &self.mesh, &change, &law, &mut y);
+        y.resize(x.len(), c64::default());
         y
     }
 
-    /// Solves with the derivative, preconditioned by a system of the matrix that is nearest to it.
+    /// Solves with the derivative for all unknowns, preconditioned by the system of the matrix that is nearest to it.
     fn invert(
         &self,
         side: Side,
         right_side: &[c64],
-        nearest: &mut FieldSystem,
+        nearest: &mut PreparedSystem,
         tolerance: f64,
     ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let count = self.model.unknown_count();
+        let circuits = nearest.circuits().cloned();
+        let mut rest = right_side.to_vec();
+        let mut first = vec![c64::default(); rest.len()];
+        let mut scale = norm(right_side);
+        if let Some(circuits) = &circuits {
+            // What the rows of circuits ask for first: the rest is of the field alone.
+            rest[..count].fill(c64::default());
+            first = nearest.solve_once(&rest)?.0;
+            rest = right_side[..count].to_vec();
+            rest.resize(first.len(), c64::default());
+            scale = norm(&rest) + circuits.size(&first[count..]);
+            axpy(c64::from(-1.0), &self.apply(side, &first, Some(circuits)), &mut rest);
+        }
         let mut inner = 0;
-        let operator = &mut |x: &[c64]| Ok(self.apply(side, x));
+        let operator = &mut |x: &[c64]| Ok(self.apply(side, x, circuits.as_ref()));
         let preconditioner = &mut |r: &[c64]| {
             let (z, report) = nearest.solve_once(r)?;
             inner += report.iterations;
             Ok(z)
         };
-        let limits = (tolerance, MOST_APPLICATIONS);
-        let (x, Ended { residual, .. }) = gmres::solve(right_side, operator, preconditioner, limits)?;
-        Ok((x, LinearSolverReport { iterations: inner, residual }))
+        let left = norm(&rest);
+        let share = if scale > 0.0 { left / scale } else { 0.0 };
+        if share <= tolerance {
+            return Ok((first, LinearSolverReport { iterations: 0, residual: share }));
+        }
+        let limits = (tolerance / share, MOST_APPLICATIONS);
+        let (x, Ended { residual, .. }) = gmres::solve(&rest, operator, preconditioner, limits)?;
+        axpy(c64::from(1.0), &x, &mut first);
+        Ok((first, LinearSolverReport { iterations: inner, residual: residual * share }))
     }
 
     /// Whether what an adjoint solution leaves is rounding, whatever the method of the system that is nearest: there is no other one for
     /// an adjoint problem alone.
-    fn is_rounding(&self, (load, solution): (&[c64], &[c64]), nearest: &mut FieldSystem) -> bool {
-        let mut residual = load.to_vec();
-        axpy(c64::from(-1.0), &self.apply(Side::Adjoint, solution), &mut residual);
+    fn is_rounding(&self, (load, solution): (&[c64], &[c64]), nearest: &mut PreparedSystem) -> bool {
+        let count = self.model.unknown_count();
+        let mut load = load[..count].to_vec();
+        let mut residual = load.clone();
+        let of_state = self.apply(Side::Adjoint, solution, nearest.circuits());
+        axpy(c64::from(-1.0), &of_state[..count], &mut residual);
         let Ok((step, _)) = nearest.solve_once(&residual) else { return false };
+        if let Some(circuits) = nearest.circuits() {
+            circuits.add_loads(&solution[count..], &mut load);
+        }
         let required = self.model.setup().linear_solver.required;
-        let left = |matrix| Left { matrix, load, solution, residual: &residual, step: &step };
+        let (load, solution, step) = (&load[..], &solution[..count], &step[..count]);
+        let left = |matrix| Left { matrix, load, solution, residual: &residual, step };
         nearest.matrix().map(left).is_some_and(|left| left.is_rounding(required))
     }
 
@@ -142,7 +180,7 @@ impl RealLinear for HarmonicTangent {
     fn solve_adjoint(
         &self,
         right_side: &[c64],
-        nearest: &mut FieldSystem,
+        nearest: &mut PreparedSystem,
     ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
         let settings = &self.model.setup().linear_solver;
         let (x, report) = self.invert(Side::Adjoint, right_side, nearest, settings.tolerance)?;
@@ -186,7 +224,9 @@ fn add_strengths(
 
 /// A state on the way.
 struct Iterate {
+    /// Those of circuits behind those of the field.
     values: Vec<c64>,
+    /// In the rows of the field.
     residual: Vec<c64>,
 }
 
@@ -196,14 +236,64 @@ struct Problem<'a> {
     mesh: &'a Mesh,
     matrix: CsrMatrix<c64>,
     load: Vec<c64>,
+    /// Net currents [A] of solid conductors, behind the load.
+    of_solids: Vec<c64>,
+    solids: SolidRows,
+    circuits: Option<Equations>,
 }
 
-impl Problem<'_> {
+impl<'a> Problem<'a> {
+    fn new(model: &'a FieldModel, mesh: &'a Mesh) -> Self {
+        let (mut load, solids) = (model.load(mesh), model.solid_rows(mesh));
+        let of_solids = load.split_off(model.unknown_count());
+        let circuits = Equations::new(model.windings(), solids.clone(), model.angular_frequency());
+        Self { model, mesh, matrix: model.assemble(mesh), load, of_solids, solids, circuits }
+    }
+
+    /// The load of the field with that of currents and voltages among some unknowns.
+    fn load_of(&self, values: &[c64]) -> Vec<c64> {
+        let mut load = self.load.clone();
+        if let Some(circuits) = &self.circuits {
+            circuits.add_loads(&values[load.len()..], &mut load);
+        }
+        load
+    }
+
+    /// The size of that load, whatever of it cancels.
+    fn scale(&self, values: &[c64]) -> f64 {
+        let of_circuits = self.circuits.as_ref().map(|own| own.size(&values[self.load.len()..]));
+        norm(&self.load) + of_circuits.unwrap_or_default()
+    }
+
+    /// What some unknowns lack of the equations of circuits, and the largest of their parts [1].
+    fn lacking(&self, values: &[c64]) -> (Vec<c64>, f64) {
+        let of_circuits =
+            self.circuits.as_ref().map(|own| own.lacking(values.split_at(self.load.len()), &self.of_solids));
+        of_circuits.unwrap_or_default()
+    }
+
+    /// The state that some unknowns are.
+    fn state(&self, mut values: Vec<c64>, report: LinearSolverReport) -> FieldSolution {
+        let currents = values.split_off(self.load.len() + self.solids.count());
+        FieldSolution::state(values, report).with_currents(currents)
+    }
+
+    /// The system of the matrix that is nearest to a derivative.
+    fn nearest(
+        &self,
+        tangent: &HarmonicTangent,
+        systems: &mut StepSystems<'_>,
+    ) -> Result<PreparedSystem, SolverError> {
+        let matrix = self.model.with_tangents(&self.matrix, &tangent.tensors(), self.mesh);
+        systems.prepare((matrix, self.solids.clone()))
+    }
+
     /// Some unknowns with their residual.
     fn at(&self, values: Vec<c64>) -> Iterate {
-        let mut residual = vec![c64::default(); values.len()];
-        self.matrix.mul(&values, &mut residual);
-        axpy(c64::from(-1.0), &self.load, &mut residual);
+        let count = self.load.len();
+        let mut residual = vec![c64::default(); count];
+        self.matrix.mul(&values[..count], &mut residual);
+        axpy(c64::from(-1.0), &self.load_of(&values), &mut residual);
         let elements = self.model.elements_with_a_law();
         let strength = |position: usize, _: usize, b: Complex3| {
             let e = elements[position];
@@ -211,26 +301,33 @@ impl Problem<'_> {
             let (h, linear) = (curve.phasor(b).field_strength(), self.model.coefficients_of(e).reluctivity);
             std::array::from_fn(|d| h[d] - linear * b[d])
         };
-        let state = FieldSolution::of_state(values.clone());
+        let state = FieldSolution::of_state(values[..count].to_vec());
         add_strengths(self.model, self.mesh, &state, &strength, &mut residual);
         Iterate { values, residual }
     }
 
-    /// Where to start: a share of the field of the linear parts, as in statics.
+    /// Where to start: the field of the linear parts that circuits drive, and a share of that of given currents, as in statics.
     fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
-        let mut system = systems.prepare(self.matrix.clone())?;
-        let (values, report) = system.solve_field(&self.load)?;
-        let zero = self.at(vec![c64::default(); self.load.len()]);
-        let mut nearest = system.into_field();
-        let found = self.search(&zero, &values, &mut nearest)?;
-        systems.keep(nearest);
-        Ok((found.map_or(zero, |(start, _)| start), report.iterations))
+        let mut system = systems.prepare((self.matrix.clone(), self.solids.clone()))?;
+        let (mut values, report, currents) = system.solve_with(&self.load, Excitation::Given(&[]))?;
+        values.extend(currents);
+        let mut driven = vec![c64::default(); self.load.len()];
+        if self.circuits.is_some() {
+            driven.extend(&self.of_solids);
+            let currents;
+            (driven, _, currents) = system.solve_with(&driven, Excitation::Voltages)?;
+            driven.extend(currents);
+        }
+        let driven = self.at(driven);
+        let found = self.search(&driven, &values, &mut system)?;
+        systems.keep(system.into_field());
+        Ok((found.map_or(driven, |(start, _)| start), report.iterations))
     }
 
     /// The derivative at some unknowns.
     fn tangent(&self, values: &[c64]) -> HarmonicTangent {
         let (space, model) = (self.model.space(), self.model);
-        let state = FieldSolution::of_state(values.to_vec());
+        let state = FieldSolution::of_state(values[..self.load.len()].to_vec());
         let of_element = |&e: &_| {
             let curve = model.curve_of(e).expect("an element with a law");
             let (mut points, mut count) = ([None; MOST_POINTS], 0);
@@ -258,8 +355,9 @@ impl Problem<'_> {
         &self,
         from: &Iterate,
         step: &[c64],
-        nearest: &mut FieldSystem,
+        nearest: &mut PreparedSystem,
     ) -> Result<Option<(Iterate, f64)>, SolverError> {
+        // Over the rows of the field, the first.
         let product = |a: &[c64], b: &[c64]| ordered_sum(a.len(), |i| a[i].re * b[i].re + a[i].im * b[i].im);
         let mut measure = |residual: &[c64]| -> Result<f64, SolverError> {
             Ok(product(residual, &nearest.solve_once(residual)?.0))
@@ -300,8 +398,8 @@ pub(crate) fn solve(
     (systems, start): (&mut StepSystems<'_>, Option<&[c64]>),
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
-    let problem = Problem { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
-    let (scale, settings) = (norm(&problem.load), &model.setup().linear_solver);
+    let problem = Problem::new(model, mesh);
+    let settings = &model.setup().linear_solver;
     let mut descent = Descent::new(settings.tolerance);
     let (mut iterate, mut iterations, mut steps) = match start {
         Some(values) => (problem.at(values.to_vec()), 0, 0),
@@ -312,41 +410,52 @@ pub(crate) fn solve(
     };
     let mut damping = 1.0;
     loop {
-        let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 };
+        let (scale, (lacking, of_circuits)) =
+            (problem.scale(&iterate.values), problem.lacking(&iterate.values));
+        let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 }.max(of_circuits);
         observer(NewtonProgress { steps, residual, energy: None, damping });
         let tangent = problem.tangent(&iterate.values);
-        let nearest = model.with_tangents(&problem.matrix, &tangent.tensors(), mesh);
-        let system = systems.prepare(nearest)?;
+        let mut system = problem.nearest(&tangent, systems)?;
         let verdict = descent.after(residual);
         if systems.is_state(verdict, residual, system.method()) {
             let report = LinearSolverReport { iterations, residual };
-            let state = FieldSolution::state(iterate.values, report).after_newton(steps);
+            let state = problem.state(iterate.values, report).after_newton(steps);
             return Ok((state, system.with_tangent(tangent)));
         }
-        let mut field = system.into_field();
-        let right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
+        let mut right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
+        right_side.extend(lacking);
         // As exact as the next residual is small.
         let tolerance = residual.min(LOOSEST).max(0.1 * settings.tolerance / residual);
-        let (step, report) = tangent.invert(Side::State, &right_side, &mut field, tolerance)?;
+        let (step, report) = tangent.invert(Side::State, &right_side, &mut system, tolerance)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
-        let found = if goes_on { problem.search(&iterate, &step, &mut field)? } else { None };
+        let found = if goes_on { problem.search(&iterate, &step, &mut system)? } else { None };
         let Some((next, length)) = found else {
-            let (load, solution) = (&problem.load[..], &iterate.values[..]);
-            let left = |matrix| Left { matrix, load, solution, residual: &right_side, step: &step };
-            let is_state = systems.is_rounding(field.method(), field.matrix().map(left));
-            systems.keep(field);
+            let count = problem.load.len();
+            let load = problem.load_of(&iterate.values);
+            let (solution, residual_of_field) = (&iterate.values[..count], &right_side[..count]);
+            let left = |matrix| Left {
+                matrix,
+                load: &load,
+                solution,
+                residual: residual_of_field,
+                step: &step[..count],
+            };
+            let is_state = systems.is_rounding(system.method(), system.matrix().map(left));
+            systems.keep(system.into_field());
             if is_state {
-                let nearest = model.with_tangents(&problem.matrix, &tangent.tensors(), mesh);
+                let system = problem.nearest(&tangent, systems)?;
                 let report = LinearSolverReport { iterations, residual };
-                let state = FieldSolution::state(iterate.values, report).after_newton(steps);
-                return Ok((state, systems.prepare(nearest)?.with_tangent(tangent)));
+                let state = problem.state(iterate.values, report).after_newton(steps);
+                return Ok((state, system.with_tangent(tangent)));
             }
             let mut values = iterate.values.clone();
             axpy(c64::from(1.0), &step, &mut values);
+            values.truncate(count);
+            iterate.values.truncate(count);
             let [from, to] = [iterate.values, values].map(FieldSolution::of_state);
             return Err(newton::refused(model, mesh, (steps, residual), &from, &to));
         };
-        systems.keep(field);
+        systems.keep(system.into_field());
         iterations += report.iterations;
         (steps, damping, iterate) = (steps + 1, length, next);
     }

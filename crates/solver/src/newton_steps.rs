@@ -6,11 +6,9 @@
 //! above what the law asks for. Where that happens the state is solved for again from where it began, by the next method of the
 //! ladder; what it is depends on mesh, model, start and the method in use alone, which a journal has.
 
-use fluxmorph_geometry::fem::{CsrMatrix, c64};
-
 use crate::error::{NewtonFailure, SolverError};
 use crate::linear::{FieldSystem, Left, LinearSolverCache, Method, PreparedSystem, SolverEvent};
-use crate::model::FieldModel;
+use crate::model::{AssembledMatrix, FieldModel};
 
 /// Steps after which there is no hope: five to fifteen are usual.
 pub(crate) const MOST_STEPS: usize = 60;
@@ -94,11 +92,14 @@ impl<'a> StepSystems<'a> {
         if model.angular_frequency() > 0.0 { cache } else { cache.within_a_state() }
     }
 
-    /// The system of a matrix.
+    /// The system of a matrix, with its circuits.
     ///
     /// # Errors
     /// As [`FieldModel::prepare_with`].
-    pub(crate) fn prepare(&mut self, matrix: CsrMatrix<c64>) -> Result<PreparedSystem, SolverError> {
+    pub(crate) fn prepare(
+        &mut self,
+        matrix: impl Into<AssembledMatrix>,
+    ) -> Result<PreparedSystem, SolverError> {
         self.model.prepare_with(matrix, &mut self.cache)
     }
 

@@ -156,14 +156,6 @@ fn check_solids(setup: &FieldModelSetup) -> Result<(), SolverError> {
         return Ok(());
     };
     let coil = &setup.coils[coil].name;
-    if setup.bh.iter().any(Option::is_some) {
-        let expected = "materials with a permeability: above 0 Hz a circuit is solved with linear materials";
-        return Err(SolverError::parameter(
-            "bh",
-            format!("a curve beside the solid conductor `{coil}`"),
-            expected,
-        ));
-    }
     if setup.ownership.is_some() {
         return Err(SolverError::SolidOnRanks { coil: coil.clone() });
     }
@@ -179,14 +171,6 @@ fn check_laws(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
         return refuse("number of B–H laws", setup.bh.len().to_string(), "at most one a region");
     }
     let Some(first) = setup.bh.iter().position(Option::is_some) else { return Ok(()) };
-    let is_driven = setup.windings.iter().flatten().any(|winding| winding.voltage.is_some());
-    if setup.frequency > 0.0 && is_driven {
-        return refuse(
-            "voltage",
-            "of a coil beside a B–H curve".to_owned(),
-            "a given current: above 0 Hz a circuit is solved with linear materials",
-        );
-    }
     if setup.ownership.is_some() {
         let region = mesh.topology().region_names()[first].clone();
         return Err(SolverError::CurveOnRanks { region });

@@ -103,6 +103,11 @@ impl FieldSolution {
         &self.values
     }
 
+    /// All unknowns, the currents that voltages drive behind the others: what a similar state may begin with.
+    pub fn unknowns(&self) -> Vec<c64> {
+        [&self.values[..], &self.currents].concat()
+    }
+
     /// Iterations and true residual of the linear solver.
     pub fn report(&self) -> LinearSolverReport {
         self.report

@@ -13,10 +13,10 @@ use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::newton::NewtonProgress;
 use fluxmorph_solver::{
     BhCurve, ElementFamily, FieldModel, FieldModelSetup, Functional, Material, Order, RigidMotion,
-    SolverError, Winding, adjoint,
+    SolverError, adjoint,
 };
 
-use crate::{ALL, NO_CIRCUIT, OUTSIDE, flux_parallel, lines, painted};
+use crate::{ALL, OUTSIDE, flux_parallel, lines, painted};
 
 /// An iron block under a coil, with cells of air that are observed; some hundred nodes.
 fn mesh() -> Mesh {
@@ -282,11 +282,6 @@ fn laws_are_refused_where_they_have_no_meaning() {
             other => panic!("{other:?}"),
         }
     };
-    let voltage = Winding { turns: 10.0, resistance: 1.0, voltage: Some(c64::from(10.0)), ..NO_CIRCUIT };
-    let driven = |setup: &mut FieldModelSetup| {
-        (setup.frequency, setup.windings) = (50.0, vec![Some(voltage)]);
-    };
-    assert_eq!(refused(&driven), "voltage");
     assert_eq!(refused(&|setup| setup.remanence = vec![[0.0; 3], [0.0, 0.0, 1.0]]), "remanence");
     assert_eq!(refused(&|setup| setup.bh.extend([None, None])), "number of B–H laws");
 }

@@ -162,15 +162,13 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
                 );
             }
         }
-        let is_of_inductances = functional.coils.is_some()
-            && !matches!(functional.kind, ObjectiveKind::FluxLinkage)
-            && functional.kind.may_be_static();
-        if is_of_inductances && config.saturating_region().is_some() {
+        if functional.kind.is_of_inductances() && config.saturating_region().is_some() {
             let message = format!(
                 "`{path}` is of inductances, which a B–H curve does not have: they depend on the current"
             );
             let fault = source.diagnostic(&format!("{path}.kind"), message);
-            faults.push(fault.expected("flux_linkage, or materials with a permeability"));
+            let instead = "flux_linkage, power or loss, or materials with a permeability";
+            faults.push(fault.expected(instead));
         }
     }
     faults

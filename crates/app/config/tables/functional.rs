@@ -297,11 +297,6 @@ impl ObjectiveKind {
         }
     }
 
-    /// Whether it has a meaning at 0 Hz.
-    pub fn may_be_static(self) -> bool {
-        self.why_not_static().is_none()
-    }
-
     /// Whether it has no meaning at 0 Hz, and why.
     fn why_not_static(self) -> Option<&'static str> {
         match self {
@@ -314,6 +309,19 @@ impl ObjectiveKind {
             }
             _ => None,
         }
+    }
+
+    /// Whether it is a function of the inductances of coils, whatever their currents.
+    pub fn is_of_inductances(self) -> bool {
+        matches!(
+            self,
+            Self::Inductance
+                | Self::MutualInductance
+                | Self::Coupling
+                | Self::Resistance
+                | Self::QualityFactor
+                | Self::LinkEfficiency
+        )
     }
 
     /// Whether it is of an expansion of `[[multipoles]]`.

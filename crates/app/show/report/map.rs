@@ -70,7 +70,8 @@ impl SurfaceValues {
             let place = place(data, outline, design, moment)
                 .filter(|_| !may_move || data.fields[moment as usize].is_ok())?;
             let mut all = vec![None; design.surface.nodes().len()];
-            thickness.walls(&design.surface, place).for_each(|(i, wall)| all[i] = Some(1e3 * wall.thickness));
+            let least = thickness.least_at_nodes(&design.surface, place);
+            least.into_iter().for_each(|(i, thickness)| all[i] = Some(1e3 * thickness));
             Some(all)
         });
         values[1].is_some().then_some(Self { values, is_thickness: true })

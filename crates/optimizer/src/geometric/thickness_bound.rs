@@ -15,7 +15,7 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::tet4::dot;
+use fluxmorph_geometry::tet4::{dot, norm};
 use fluxmorph_remesh::{Moved, RemeshError};
 
 use super::NoThickness;
@@ -31,6 +31,9 @@ const SAFETY: f64 = 1.02;
 
 /// Most linear limits that a method is shown: its dual problem has a variable for each.
 const MOST_LINEAR_LIMITS: usize = 1000;
+
+/// Share of a derivative along what a node may do that is rounding: it keeps to its plane.
+const ROUNDING: f64 = 1e-9;
 
 /// A limit of the thickness [m].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -125,7 +128,7 @@ impl ThicknessBound {
     }
 
     /// The limit at every node that moves, on the safe side by a little more than what the smooth function gives away; `None` where the
-    /// elastic map decides about a node opposite, or a node that stands still breaks it.
+    /// elastic map decides how far away a node opposite is, or a node that stands still breaks it.
     fn linear_limits(&self, shape: &Shape) -> Option<Vec<LinearLimit>> {
         let (thickness, surface) = (shape.thickness()?, shape.surface());
         let map = shape.motion().map();
@@ -138,7 +141,9 @@ impl ThicknessBound {
             let mut slopes: BTreeMap<usize, f64> = BTreeMap::new();
             for (node, derivative) in wall.derivatives {
                 let Ok(place) = surface.nodes().binary_search(&node) else {
-                    if map.is_unknown(node) {
+                    // Along its own plane a node may slide.
+                    let part = map.unknown_part(node, derivative);
+                    if norm(part) > ROUNDING * norm(derivative) {
                         return None;
                     }
                     continue;
@@ -201,7 +206,7 @@ impl ThicknessBound {
 
 /// What the smooth function of a limit gives away at most [m]; a limit of zero is held as one of a micrometre.
 fn given_away(limit: f64) -> f64 {
-    MARGIN * limit.abs().max(1e-6)
+    MARGIN * if limit == 0.0 { 1e-6 } else { limit.abs() }
 }
 
 /// Whether a node opposite is a design node, or one that the elastic map decides.

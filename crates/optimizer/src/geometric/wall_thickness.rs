@@ -57,11 +57,12 @@ pub struct Wall {
     pub derivatives: [(NodeId, Point); 4],
 }
 
-/// The opposite face behind every design node.
+/// The opposite faces behind every design node: one in each body that the node is a part of.
 #[derive(Clone, Debug)]
 pub struct WallThickness {
-    /// `None` where the node has no direction, or its ray leads past the body or through its side at a rim.
-    opposite: Vec<Option<Opposite>>,
+    /// With the node's place in the design surface, ascending; none where the node has no direction, or its ray leads past the body or
+    /// through its side at a rim.
+    opposite: Vec<(usize, Opposite)>,
 }
 
 impl WallThickness {
@@ -82,7 +83,7 @@ impl WallThickness {
         }
         let opposite_of = |(&node, direction): (&NodeId, &Point)| {
             if *direction == [0.0; 3] {
-                return Some(None);
+                return Some(Vec::new());
             }
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
@@ -90,60 +91,72 @@ impl WallThickness {
                 // Along the facets of a side that is round a ray from the rim meets one of them anywhere.
                 let grazing = || faces.grazed(origin, back).filter(|_| !faces.are_at_rim(node));
                 let (hit, nodes) = faces.opposite(origin, back).or_else(grazing)?;
-                Some(Some(Opposite::new(&hit, *direction, (nodes, body))))
+                Some(Opposite::new(&hit, *direction, (nodes, body)))
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
             let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
             let own = behind.get(&node).into_iter().flatten();
-            let found = own.copied().chain(beside.map(|(region, _)| *region)).find_map(in_body);
-            found.or_else(|| of.values().any(|faces| faces.are_at_rim(node)).then_some(None))
+            let mut found: Vec<Opposite> = own.copied().filter_map(in_body).collect();
+            if found.is_empty() {
+                found.extend(beside.map(|(region, _)| *region).find_map(in_body));
+            }
+            let may_have_none = || of.values().any(|faces| faces.are_at_rim(node));
+            (!found.is_empty() || may_have_none()).then_some(found)
         };
-        let opposite =
-            surface.nodes().iter().zip(surface.directions()).map(opposite_of).collect::<Option<Vec<_>>>()?;
-        opposite.iter().any(Option::is_some).then_some(())?;
-        Some(Self { opposite })
+        let nodes = surface.nodes().iter().zip(surface.directions());
+        let by_node = nodes.map(opposite_of).collect::<Option<Vec<_>>>()?;
+        let placed = |(i, found): (usize, Vec<Opposite>)| found.into_iter().map(move |own| (i, own));
+        let opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(placed).collect();
+        (!opposite.is_empty()).then_some(Self { opposite })
     }
 
     /// The same on a mesh in which every node has another number; `None` where it lacks one of them.
     pub fn renumbered(&self, new_of: &[Option<NodeId>]) -> Option<Self> {
-        let renumber = |opposite: &Option<Opposite>| match opposite {
-            None => Some(None),
-            Some(own) => {
-                let [a, b, c] = own.nodes.map(|n| new_of[n.index()]);
-                Some(Some(Opposite { nodes: [a?, b?, c?], ..*own }))
-            }
+        let renumber = |(place, own): &(usize, Opposite)| {
+            let [a, b, c] = own.nodes.map(|n| new_of[n.index()]);
+            Some((*place, Opposite { nodes: [a?, b?, c?], ..*own }))
         };
         Some(Self { opposite: self.opposite.iter().map(renumber).collect::<Option<_>>()? })
     }
 
-    /// Initial thickness [m] at every design node that has one, with the node's place in the design surface.
+    /// Initial thickness [m] behind every design node, in each of its bodies, with the node's place in the design surface.
     pub fn at_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
-        self.opposite.iter().enumerate().filter_map(|(i, opposite)| Some((i, (*opposite)?.distance)))
+        self.opposite.iter().map(|(i, opposite)| (*i, opposite.distance))
     }
 
-    /// The triangle opposite of every design node that has one.
+    /// The triangles opposite of all design nodes.
     pub fn opposite_faces(&self) -> impl Iterator<Item = [NodeId; 3]> + '_ {
-        self.opposite.iter().flatten().map(|opposite| opposite.nodes)
+        self.opposite.iter().map(|(_, opposite)| opposite.nodes)
     }
 
-    /// The wall behind every design node that has one, with the node's place in the design surface, where every node of the
-    /// mesh is at `place` [m].
+    /// The walls behind all design nodes, with the node's place in the design surface, where every node of the mesh is at `place` [m].
     pub fn walls<'a>(
         &'a self,
         surface: &'a DesignSurface,
         place: impl Fn(NodeId) -> Point + 'a,
     ) -> impl Iterator<Item = (usize, Wall)> + 'a {
-        self.opposite
-            .iter()
-            .enumerate()
-            .filter_map(move |(i, opposite)| Some((i, wall(surface.nodes()[i], &(*opposite)?, &place))))
+        self.opposite.iter().map(move |(i, opposite)| (*i, wall(surface.nodes()[*i], opposite, &place)))
     }
 
-    /// Thickness [m] at every node of a moved mesh, shape `(n_nodes,)`; zero where none is measured.
+    /// The least thickness [m] behind every design node by its place in the surface, where every node of the mesh is at `place` [m].
+    pub fn least_at_nodes(
+        &self,
+        surface: &DesignSurface,
+        place: impl Fn(NodeId) -> Point,
+    ) -> BTreeMap<usize, f64> {
+        let mut least = BTreeMap::new();
+        for (i, wall) in self.walls(surface, place) {
+            let own = least.entry(i).or_insert(wall.thickness);
+            *own = wall.thickness.min(*own);
+        }
+        least
+    }
+
+    /// The same at every node of a moved mesh, shape `(n_nodes,)`; zero where none is measured.
     pub fn over_nodes(&self, surface: &DesignSurface, mesh: &Mesh) -> Vec<f64> {
         let mut thickness = vec![0.0; mesh.points().len()];
-        for (i, wall) in self.walls(surface, |n| mesh.point(n)) {
-            thickness[surface.nodes()[i].index()] = wall.thickness;
+        for (i, least) in self.least_at_nodes(surface, |n| mesh.point(n)) {
+            thickness[surface.nodes()[i].index()] = least;
         }
         thickness
     }
@@ -156,7 +169,7 @@ impl WallThickness {
         place: impl Fn(NodeId) -> Point,
     ) -> BTreeMap<RegionId, f64> {
         let mut least = BTreeMap::new();
-        let bodies = self.opposite.iter().flatten().map(|opposite| opposite.body);
+        let bodies = self.opposite.iter().map(|(_, opposite)| opposite.body);
         for ((_, wall), body) in self.walls(surface, place).zip(bodies) {
             let own = least.entry(body).or_insert(f64::INFINITY);
             *own = wall.thickness.min(*own);

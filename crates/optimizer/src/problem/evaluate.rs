@@ -106,7 +106,7 @@ impl Problem {
         let Work { mut timings, report, .. } = work;
         if is_own_anchor {
             let values = |(model, state): (&FieldModel, &FieldSolution)| {
-                (!model.is_linear()).then(|| state.values().to_vec())
+                (!model.is_linear()).then(|| state.unknowns())
             };
             cache.anchor_on(&moved.mesh, self.states.iter().zip(&sums.solutions).map(values).collect());
         }
@@ -182,7 +182,7 @@ impl Problem {
             let begin = (&mut LinearSolverCache::default(), None);
             let solved = model.solve_nonlinear(reference, begin, &mut |newton| progress.newton(newton));
             let (state, _) = solved.map_err(finite::of_field("the state of the undeformed mesh", model))?;
-            Ok(Some(state.values().to_vec()))
+            Ok(Some(state.unknowns()))
         };
         let states = self.states.iter().map(state).collect::<Result<_, _>>()?;
         cache.anchor_on(reference, states);

@@ -61,14 +61,18 @@ pub fn transmissions(
             let field = inside.get(&face_key(*triangle)).map(|&e| solution.flux_density(model, mesh, e));
             field.map_or(0.0, |field| dot3(field, normal.map(c64::from)).norm())
         };
+        // A wall of several regions goes on through all that are alike.
+        let is_alike = |other: &&Conductor| other.law == conductor.law && other.name != conductor.name;
+        let others = model.conductors().iter().filter(is_alike).flat_map(|other| &other.surface);
+        let faces: Vec<[NodeId; 3]> = conductor.surface.iter().chain(others).copied().collect();
         let corners: Vec<[Point; 3]> =
-            conductor.surface.iter().map(|triangle| triangle.map(|node| mesh.point(node))).collect();
+            faces.iter().map(|triangle| triangle.map(|node| mesh.point(node))).collect();
         let behind = |wall: &Option<Wall>| {
             let Some(Wall { thickness, opposite }) = *wall else { return 0.0 };
-            2.0 * (-thickness / skin_depth).exp() * across(&conductor.surface[opposite])
+            2.0 * (-thickness / skin_depth).exp() * across(&faces[opposite])
         };
         let walls = walls(&corners, THICKEST * skin_depth);
-        let exits: Vec<Exit> = corners
+        let exits: Vec<Exit> = corners[..conductor.surface.len()]
             .iter()
             .zip(&walls)
             .map(|(&corners, wall)| Exit { corners, flux_density: behind(wall) })

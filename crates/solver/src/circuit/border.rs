@@ -1,15 +1,13 @@
 //! The elimination of the field for the voltages of solid conductors and the currents that voltages drive.
 //!
-//! With `F = −c` of a solid conductor and `y` for `U` and `I` the system is `K u − F y = f`, `Fᵀu + D y = r`: see the modules
-//! above for its entries. `W = K⁻¹F`, and `(FᵀW + D) y = r − FᵀK⁻¹f`.
+//! With `W = K⁻¹F` the equations `K u − F y = f`, `Fᵀu + D y = r` ([`super::equations`]) become `(FᵀW + D) y = r − FᵀK⁻¹f`.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
 
-use super::solids::SolidRows;
-use super::{Windings, product};
+use super::equations::{Equations, Excitation};
+use super::{SolidRows, product};
 use crate::error::SolverError;
 use crate::linear::LinearSolverReport;
 
@@ -19,34 +17,25 @@ type Solve<'a> = dyn FnMut(&[c64]) -> Result<(Vec<c64>, LinearSolverReport), Sol
 /// The elimination of the field on one mesh: solid conductors first, then voltage-driven coils.
 #[derive(Debug)]
 pub(crate) struct Border {
-    windings: Arc<Windings>,
-    solids: SolidRows,
+    equations: Equations,
     /// `W`; empty where `F` is zero, of a solid conductor's current.
     responses: Vec<Vec<c64>>,
     /// `FᵀW + D` [H], by rows.
     schur: Vec<Vec<c64>>,
-    angular_frequency: f64,
     /// Iterations of all responses that it solved for, and the largest of their residuals.
     report: LinearSolverReport,
 }
 
 impl Border {
-    /// Solves for 1 Wb and 1 A in each, but for those that `earlier`, of the same matrix, has; `None` where there is neither solid
-    /// conductor nor driven current.
+    /// Solves for 1 Wb and 1 A in each, but for those that `earlier`, of the same matrix, has.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve`].
     pub(crate) fn new(
-        windings: &Arc<Windings>,
-        solids: SolidRows,
-        angular_frequency: f64,
+        equations: Equations,
         earlier: Option<Self>,
         solve: &mut Solve<'_>,
-    ) -> Result<Option<Self>, SolverError> {
-        let is_driven = windings.with_source().next().is_some();
-        if angular_frequency == 0.0 || solids.count() == 0 && !is_driven {
-            return Ok(None);
-        }
+    ) -> Result<Self, SolverError> {
         // The iterations of those taken over have been counted.
         let residual = earlier.as_ref().map_or(0.0, |earlier| earlier.report.residual);
         let mut report = LinearSolverReport { iterations: 0, residual };
@@ -57,55 +46,32 @@ impl Border {
             report.residual = report.residual.max(own.residual);
             Ok::<_, SolverError>(response)
         };
+        let solids = equations.solids();
         of_solids.truncate(solids.count());
         for load in solids.loads.iter().skip(of_solids.len()) {
             of_solids.push(respond(load)?);
         }
         let mut responses = of_solids;
-        for (driven, _) in windings.with_source() {
+        for (driven, _) in equations.windings().with_source() {
             responses.push(match (&driven.solid, of_coils.remove(&driven.coil)) {
                 (Some(_), _) => Vec::new(),
                 (None, Some(response)) => response,
                 (None, None) => respond(&driven.load)?,
             });
         }
-        let (windings, schur) = (Arc::clone(windings), Vec::new());
-        let border = Self { windings, solids, responses, schur, angular_frequency, report };
-        let schur = border.eliminated();
-        Ok(Some(Self { schur, ..border }))
-    }
-
-    /// `FᵀW + D`.
-    fn eliminated(&self) -> Vec<Vec<c64>> {
-        let row = |load: &[c64]| self.responses.iter().map(|w| product(load, w)).collect();
-        let mut schur: Vec<Vec<c64>> = self.loads().map(row).collect();
-        let solids = self.solids.count();
-        for (k, diagonal) in self.solids.diagonal.iter().enumerate() {
-            schur[k][k] -= diagonal;
+        let mut schur = equations.block();
+        for (row, load) in schur.iter_mut().zip(equations.loads()) {
+            row.iter_mut().zip(&responses).for_each(|(entry, w)| *entry += product(load, w));
         }
-        for (k, (driven, _)) in self.windings.with_source().enumerate() {
-            let own = solids + k;
-            schur[own][own] +=
-                driven.winding.impedance(self.angular_frequency) / c64::new(0.0, self.angular_frequency);
-            for segment in driven.solid.clone().into_iter().flatten() {
-                schur[own][segment] += 1.0;
-                schur[segment][own] += 1.0;
-            }
-        }
-        schur
+        Ok(Self { equations, responses, schur, report })
     }
 
     /// The responses of solid conductors, and those of coils by their places.
     fn into_responses(self) -> (Vec<Vec<c64>>, BTreeMap<usize, Vec<c64>>) {
-        let Self { windings, solids, responses: mut of_solids, .. } = self;
-        let of_coils = of_solids.split_off(solids.count());
-        (of_solids, windings.with_source().map(|(driven, _)| driven.coil).zip(of_coils).collect())
-    }
-
-    /// `F` of every unknown, as far as it is in the field's equations.
-    fn loads(&self) -> impl Iterator<Item = &[c64]> {
-        let of_coils = self.windings.with_source().map(|(driven, _)| driven.field_load());
-        self.solids.loads.iter().map(Vec::as_slice).chain(of_coils)
+        let Self { equations, responses: mut of_solids, .. } = self;
+        let of_coils = of_solids.split_off(equations.solids().count());
+        let coils = equations.windings().with_source().map(|(driven, _)| driven.coil);
+        (of_solids, coils.zip(of_coils).collect())
     }
 
     /// Iterations of the responses, and the largest of their residuals.
@@ -113,15 +79,20 @@ impl Border {
         self.report
     }
 
+    /// The equations that it is made from.
+    pub(crate) fn equations(&self) -> &Equations {
+        &self.equations
+    }
+
     /// What solid conductors add to the field's matrix.
     pub(crate) fn solids(&self) -> &SolidRows {
-        &self.solids
+        self.equations.solids()
     }
 
     /// Number of the field's unknowns, without and with those of solid conductors.
     pub(crate) fn field_unknowns(&self) -> [usize; 2] {
         let count = self.responses.first().map_or(0, Vec::len);
-        [count, count + self.solids.count()]
+        [count, count + self.solids().count()]
     }
 
     /// Completes `K⁻¹f` to the solution of the whole system, with the `U` of solid conductors behind it; the currents [A].
@@ -132,15 +103,9 @@ impl Border {
         of_solids: &[c64],
         right_side: Excitation<'_>,
     ) -> Vec<c64> {
-        let solids = self.solids.count();
-        let entry = |entries: &[c64], k: usize| entries.get(k).map_or(c64::default(), |entry| -entry);
-        let sources = self.windings.with_source().enumerate().map(|(d, (_, voltage))| match right_side {
-            Excitation::Voltages => voltage / c64::new(0.0, self.angular_frequency),
-            Excitation::Given(entries) => entry(entries, d),
-            Excitation::Open => c64::default(),
-        });
+        let solids = self.solids().count();
         let size = if right_side == Excitation::Open { solids } else { self.schur.len() };
-        let right = (0..solids).map(|k| entry(of_solids, k)).chain(sources).zip(self.loads());
+        let right = self.equations.right_sides(of_solids, right_side).into_iter().zip(self.equations.loads());
         let right: Vec<c64> = right.map(|(r, load)| r - product(load, values)).take(size).collect();
         let matrix = self.schur.iter().take(size).map(|row| row[..size].to_vec()).collect();
         let mut unknowns = solve_dense(matrix, right);
@@ -153,17 +118,6 @@ impl Border {
         values.extend(unknowns);
         currents
     }
-}
-
-/// What is on the right side of the circuits' equations.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Excitation<'a> {
-    /// The voltages of the sources, as of a state.
-    Voltages,
-    /// These entries, as of an adjoint, zero where they end.
-    Given(&'a [c64]),
-    /// No current flows in them, as of the response to 1 A.
-    Open,
 }
 
 /// Gaussian elimination with row pivoting, for the few equations of circuits.

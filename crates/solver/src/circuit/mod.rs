@@ -10,10 +10,11 @@
 //! derivative of `K` remains all there is. It is solved by eliminating `u`: one further solution a coil. All values are those
 //! of the meshed part. At 0 Hz a voltage drives `V/R`. A solid conductor is a coil of one turn, whose `λ = V/(jω)` is itself an
 //! unknown of the field (`solids`).
-//! Lives here: windings (`mod`), the elimination (`border`), solid conductors (`solids`), what the terminals see (`terminals`). Does not live here: the loads
+//! Lives here: windings (`mod`), their equations (`equations`), the elimination (`border`), solid conductors (`solids`), what the terminals see (`terminals`). Does not live here: the loads
 //! (`crate::load`), functionals of terminals and inductances (`crate::functional`).
 
 mod border;
+pub(crate) mod equations;
 pub(crate) mod solids;
 mod terminals;
 
@@ -30,7 +31,8 @@ use crate::load::Sources;
 use crate::material::Material;
 use crate::space::Space;
 use crate::unknowns::Unknowns;
-pub(crate) use border::{Border, Excitation};
+pub(crate) use border::Border;
+pub(crate) use equations::{Equations, Excitation};
 pub(crate) use solids::{SolidRows, Solids};
 pub use terminals::{
     CoilTerminals, Terminals, currents, direct_resistances, flux_linkages, powers, terminals,

@@ -19,7 +19,8 @@ pub struct CoilTerminals {
     pub current: c64,
     /// Flux linkage [Wb].
     pub flux_linkage: c64,
-    /// Resistance [Ω]: that of the winding, and that of the losses that its current alone makes in the field.
+    /// Resistance [Ω]: that of the winding, and that of the losses that its current alone makes in the field; above 0 Hz beside iron
+    /// that saturates `Re(V/I)` of the state.
     pub resistance: f64,
     /// Voltage across the coil with its resistance, without what else is in series [V].
     pub voltage: c64,
@@ -152,12 +153,14 @@ pub fn terminals(
         let flux_linkage = windings.linkage(k, model, mesh, solution);
         let current = windings.current(k, model, solution);
         let wire = driven.winding.resistance;
+        let apparent = if current == c64::default() { current } else { flux_linkage / current };
+        let inductance = mutual.get(k).map_or(apparent, |row| row[k]);
         CoilTerminals {
             name: model.coils()[driven.coil].name.clone(),
             current,
             flux_linkage,
             // Re(jωL) = −ω Im L.
-            resistance: wire - mutual.get(k).map_or(0.0, |row| angular_frequency * row[k].im),
+            resistance: wire - angular_frequency * inductance.im,
             voltage: driven.voltage(model, current, flux_linkage),
         }
     };

@@ -29,7 +29,7 @@ pub use force::{Force, RigidMotion, resultant};
 pub use homogeneity::{Compared, FieldQuality};
 pub use inductance::{InductanceFunctional, Inductive};
 pub use integral::Integral;
-pub use multipole::{MirrorPlane, MultipoleFunctional, Multipoles, OfTerms};
+pub use multipole::{MirrorPlane, MultipoleFunctional, Multipoles, OfTerms, rounding_of_main};
 pub use observation::{Follow, Observation, Observed, Weighting};
 pub use terminal::{AtTerminals, TerminalFunctional};
 pub use volume::Volume;

@@ -433,16 +433,22 @@ impl MultipoleFunctional {
     }
 }
 
-/// Refuses a content that is compared with nothing but rounding.
-fn check_main(main: &[Harmonic], coefficients: &[(Harmonic, c64)]) -> Result<(), SolverError> {
+/// The largest term of the main order, and the largest of all beside which it is nothing but rounding; `None` where it is more.
+pub fn rounding_of_main<'a>(
+    main: &[Harmonic],
+    coefficients: &'a [(Harmonic, c64)],
+) -> Option<[&'a (Harmonic, c64); 2]> {
     let size = |(_, c): &&(Harmonic, c64)| c.norm();
     let by_size = |a: &&(Harmonic, c64), b: &&(Harmonic, c64)| size(a).total_cmp(&size(b));
-    let largest = coefficients.iter().max_by(by_size);
-    let of_main = coefficients.iter().filter(|(term, _)| main.contains(term)).max_by(by_size);
-    let (Some(largest), Some(of_main)) = (largest, of_main) else { return Ok(()) };
-    if size(&of_main) > LEAST_MAIN * size(&largest) || size(&largest) == 0.0 {
-        return Ok(());
-    }
+    let largest = coefficients.iter().max_by(by_size)?;
+    let of_main = coefficients.iter().filter(|(term, _)| main.contains(term)).max_by(by_size)?;
+    let is_more = size(&of_main) > LEAST_MAIN * size(&largest) || size(&largest) == 0.0;
+    (!is_more).then_some([of_main, largest])
+}
+
+/// Refuses a content that is compared with nothing but rounding.
+fn check_main(main: &[Harmonic], coefficients: &[(Harmonic, c64)]) -> Result<(), SolverError> {
+    let Some([of_main, largest]) = rounding_of_main(main, coefficients) else { return Ok(()) };
     let of = |(term, c): &(Harmonic, c64)| format!("{:.1e} T of {term}", c.norm());
     Err(SolverError::parameter(
         "the main order of an expansion",

@@ -9,7 +9,7 @@ use super::distributed::DistributedSystem;
 use super::method::{Method, Reuse};
 use super::report::LinearSolverReport;
 use super::system::{Goal, LocalSystem, SolverEvent};
-use crate::circuit::{Border, Excitation, Windings};
+use crate::circuit::{Border, Equations, Excitation, Windings};
 use crate::error::SolverError;
 
 /// The field's matrix ready to be solved with, wherever it is.
@@ -23,14 +23,15 @@ pub(crate) enum FieldSystem {
 
 /// A derivative of the field's equations that is linear over the real numbers alone.
 pub(crate) trait RealLinear: std::fmt::Debug + Send + Sync {
-    /// Solves the adjoint problem, preconditioned by the matrix that is nearest to the derivative.
+    /// Solves the adjoint problem for all unknowns, those of circuits behind the field's, preconditioned by the system of the matrix
+    /// that is nearest to the derivative.
     ///
     /// # Errors
     /// [`SolverError::NotConverged`], and those of the preconditioner.
     fn solve_adjoint(
         &self,
         right_side: &[c64],
-        nearest: &mut FieldSystem,
+        nearest: &mut PreparedSystem,
     ) -> Result<(Vec<c64>, LinearSolverReport), SolverError>;
 }
 
@@ -44,18 +45,16 @@ pub struct PreparedSystem {
 }
 
 impl PreparedSystem {
-    /// Solves for what borders the field's matrix, if anything does.
+    /// Solves for the circuits that border the field's matrix, if any do; `earlier` is a border of the same matrix.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve`].
     pub(crate) fn new(
         mut field: FieldSystem,
-        border: impl FnOnce(
-            &mut dyn FnMut(&[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError>,
-        ) -> Result<Option<Border>, SolverError>,
+        (circuits, earlier): (Option<Equations>, Option<Border>),
     ) -> Result<Self, SolverError> {
-        let border = border(&mut |right_side| field.solve(right_side))?;
-        Ok(Self { field, border, tangent: None })
+        let border = circuits.map(|own| Border::new(own, earlier, &mut |right_side| field.solve(right_side)));
+        Ok(Self { border: border.transpose()?, field, tangent: None })
     }
 
     /// The same with a derivative that the matrix is nearest to.
@@ -74,7 +73,7 @@ impl PreparedSystem {
     ) -> Result<Self, SolverError> {
         let Self { field, border, .. } = self;
         let solids = border.as_ref().map(|border| border.solids().clone()).unwrap_or_default();
-        Self::new(field, |solve| Border::new(windings, solids, angular_frequency, border, solve))
+        Self::new(field, (Equations::new(windings, solids, angular_frequency), border))
     }
 
     /// The field's matrix alone.
@@ -174,10 +173,34 @@ impl PreparedSystem {
     /// # Errors
     /// As [`PreparedSystem::solve_field`].
     pub fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
-        let unknowns = self.border.as_ref().map_or(right_side.len(), |border| border.field_unknowns()[1]);
-        let (field, circuits) = right_side.split_at(unknowns.min(right_side.len()));
-        let (values, report, _) = self.solve_with(field, Excitation::Given(circuits))?;
+        let (mut values, report) = self.solve_all(right_side)?;
+        values.truncate(self.field_unknowns(&values)[1]);
         Ok((values, report))
+    }
+
+    /// Number of the field's unknowns, without and with those of solid conductors, of a vector without others.
+    fn field_unknowns(&self, vector: &[c64]) -> [usize; 2] {
+        self.border.as_ref().map_or([vector.len(); 2], Border::field_unknowns)
+    }
+
+    /// As [`PreparedSystem::solve`], with the currents that voltages drive behind the field's unknowns.
+    fn solve_all(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let (field, circuits) = right_side.split_at(self.field_unknowns(right_side)[1].min(right_side.len()));
+        let (mut values, report, currents) = self.solve_with(field, Excitation::Given(circuits))?;
+        values.extend(currents);
+        Ok((values, report))
+    }
+
+    /// The same, and keeps nothing of it for other designs: one of very many.
+    pub(crate) fn solve_once(
+        &mut self,
+        right_side: &[c64],
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let solved = self.solve_all(right_side)?;
+        if let FieldSystem::Local(system) = &mut self.field {
+            system.forget_last();
+        }
+        Ok(solved)
     }
 
     /// Solves with what excites the circuits; the currents [A] that flow in them too.
@@ -189,12 +212,14 @@ impl PreparedSystem {
         right_side: &[c64],
         excitation: Excitation<'_>,
     ) -> Result<(Vec<c64>, LinearSolverReport, Vec<c64>), SolverError> {
-        let unknowns = self.border.as_ref().map_or(right_side.len(), |border| border.field_unknowns()[0]);
+        if let Some(tangent) = self.tangent.take() {
+            let solved = self.solve_adjoint(&*tangent, right_side, excitation);
+            self.tangent = Some(tangent);
+            return solved;
+        }
+        let unknowns = self.field_unknowns(right_side)[0];
         let (right_side, of_solids) = right_side.split_at(unknowns.min(right_side.len()));
-        let (mut values, mut report) = match &self.tangent {
-            Some(tangent) => tangent.solve_adjoint(right_side, &mut self.field)?,
-            None => self.field.solve(right_side)?,
-        };
+        let (mut values, mut report) = self.field.solve(right_side)?;
         let border = self.border.as_ref();
         // What circuits drive is as exact as the responses that it is made of.
         if let (Some(border), Excitation::Voltages) = (border, excitation) {
@@ -203,6 +228,29 @@ impl PreparedSystem {
         }
         let currents = border.map(|border| border.complete(&mut values, of_solids, excitation));
         Ok((values, report, currents.unwrap_or_default()))
+    }
+
+    /// Solves with a derivative that this system is nearest to, for the entries of adjoint problems.
+    fn solve_adjoint(
+        &mut self,
+        tangent: &dyn RealLinear,
+        right_side: &[c64],
+        excitation: Excitation<'_>,
+    ) -> Result<(Vec<c64>, LinearSolverReport, Vec<c64>), SolverError> {
+        let mut right_side = right_side.to_vec();
+        let unknowns = self.field_unknowns(&right_side)[1];
+        if let Excitation::Given(entries) = excitation {
+            right_side.resize(unknowns, c64::default());
+            right_side.extend(entries);
+        }
+        let (mut values, report) = tangent.solve_adjoint(&right_side, self)?;
+        let currents = values.split_off(unknowns);
+        Ok((values, report, currents))
+    }
+
+    /// The circuits that border the field's matrix.
+    pub(crate) fn circuits(&self) -> Option<&Equations> {
+        self.border.as_ref().map(Border::equations)
     }
 
     /// `r −= K x` of the field with solid conductors; nothing where the matrix is on several ranks.
@@ -256,18 +304,6 @@ impl FieldSystem {
             Self::Local(system) => system.into_cache(),
             Self::Distributed(_) => LinearSolverCache::default(),
         }
-    }
-
-    /// Solves, and keeps nothing of it for other designs: one of very many.
-    pub(crate) fn solve_once(
-        &mut self,
-        right_side: &[c64],
-    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
-        let solved = self.solve(right_side)?;
-        if let Self::Local(system) = self {
-            system.forget_last();
-        }
-        Ok(solved)
     }
 
     fn solve(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {

@@ -14,7 +14,7 @@ use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
-use crate::circuit::{Border, SolidRows, Solids, Windings};
+use crate::circuit::{Equations, SolidRows, Solids, Windings};
 use crate::coil::{Coil, RegionCurrent};
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
@@ -79,6 +79,12 @@ impl From<CsrMatrix<c64>> for AssembledMatrix {
     }
 }
 
+impl From<(CsrMatrix<c64>, SolidRows)> for AssembledMatrix {
+    fn from((matrix, solids): (CsrMatrix<c64>, SolidRows)) -> Self {
+        Self { field: FieldMatrix::Local(matrix), solids }
+    }
+}
+
 impl FieldModel {
     pub(crate) fn has_reentrant_walls(&self) -> bool {
         self.weak_form.has_reentrant_walls()
@@ -108,8 +114,12 @@ impl FieldModel {
             None => FieldMatrix::Local(self.assemble(mesh)),
             Some(_) => FieldMatrix::OnRanks(mesh.points().to_vec()),
         };
-        let solids = self.shared.fine.solid_rows(self.solids(), &self.weak_form, mesh);
-        AssembledMatrix { field, solids }
+        AssembledMatrix { field, solids: self.solid_rows(mesh) }
+    }
+
+    /// What solid conductors add to the matrix on a mesh.
+    pub(crate) fn solid_rows(&self, mesh: &Mesh) -> SolidRows {
+        self.shared.fine.solid_rows(self.solids(), &self.weak_form, mesh)
     }
 
     /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown, then the net current [A] of each
@@ -156,8 +166,7 @@ impl FieldModel {
             }
             _ => panic!("a matrix belongs where its model is"),
         };
-        let (windings, angular_frequency) = (self.windings(), self.angular_frequency);
-        PreparedSystem::new(field, |solve| Border::new(windings, solids, angular_frequency, None, solve))
+        PreparedSystem::new(field, (Equations::new(self.windings(), solids, self.angular_frequency), None))
     }
 
     /// What defines the problem.

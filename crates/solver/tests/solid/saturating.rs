@@ -1,0 +1,182 @@
+//! Solid conductors and voltages beside iron that saturates, above 0 Hz: against the linear material, given currents, and differences.
+
+use std::sync::Arc;
+
+use fluxmorph_geometry::Mesh;
+use fluxmorph_geometry::fem::c64;
+use fluxmorph_geometry::tet4::Point;
+use fluxmorph_solver::circuit::terminals;
+use fluxmorph_solver::functional::AtTerminals;
+use fluxmorph_solver::material::VACUUM_PERMEABILITY;
+use fluxmorph_solver::{
+    BhCurve, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, Order, Winding,
+    adjoint,
+};
+
+use super::{bar_in_a_box, setup_with_a_bar, sway};
+use crate::{ALL, NO_CIRCUIT};
+
+/// Hz.
+const FREQUENCY: f64 = 300.0;
+
+const IRON: Material = Material { relative_permeability: 2000.0, conductivity: 5e5 };
+
+/// What is in series with the bar and the winding.
+const SERIES: [Winding; 2] = [
+    Winding { resistance: 1e-5, series_inductance: 1e-8, ..NO_CIRCUIT },
+    Winding { turns: 20.0, resistance: 0.05, ..NO_CIRCUIT },
+];
+
+/// Saturates at 1.8 T.
+fn curve() -> BhCurve {
+    let point = |i: i32| {
+        let h = 20.0 * (1.3_f64.powi(i) - 1.0);
+        [h, VACUUM_PERMEABILITY * h + 1.8 * (1.0 - (-h / 700.0).exp())]
+    };
+    BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table")
+}
+
+/// The bar and the winding with their currents [A], or with these voltages [V], beside the plate of iron.
+fn setup(
+    mesh: &Mesh,
+    elements: (ElementFamily, Order),
+    (iron, curve): (Material, Option<BhCurve>),
+    (currents, voltages): ([c64; 2], [Option<c64>; 2]),
+) -> FieldModelSetup {
+    let mut setup = setup_with_a_bar(mesh, elements, FREQUENCY, (0.0, NO_CIRCUIT));
+    setup.materials[2] = iron;
+    setup.bh = vec![None, None, curve.map(Arc::new)];
+    for k in 0..2 {
+        setup.coils[k].ampere_turns = SERIES[k].turns * currents[k];
+        setup.windings[k] = Some(Winding { voltage: voltages[k], ..SERIES[k] });
+    }
+    setup
+}
+
+/// Of two phases [A]; the plate is short, and saturates late.
+const CURRENTS: [c64; 2] = [c64::new(240e3, 0.0), c64::new(-3600.0, 2400.0)];
+
+/// The voltages [V] of sources with which the bar and the winding have their currents in a state.
+fn voltages(model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> [c64; 2] {
+    let seen = terminals(model, mesh, state).expect("terminals");
+    [0, 1].map(|k| {
+        let beyond = SERIES[k].impedance(model.angular_frequency()) - SERIES[k].resistance;
+        seen.coils[k].voltage + beyond * seen.coils[k].current
+    })
+}
+
+#[test]
+fn a_straight_table_beside_circuits_is_the_linear_material() {
+    let mesh = bar_in_a_box();
+    let straight =
+        BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * IRON.reluctivity(), b])).expect("a sound table");
+    let sources = [
+        ([CURRENTS[0] * 1e-4, CURRENTS[1] * 1e-4], [None; 2]),
+        ([c64::default(); 2], [Some(c64::new(1e-3, 2e-3)), Some(c64::new(0.02, 0.0))]),
+    ];
+    for elements in ALL {
+        for sources in &sources {
+            let seen = [None, Some(straight.clone())].map(|curve| {
+                let (model, state) = crate::solved(&mesh, setup(&mesh, elements, (IRON, curve), *sources));
+                terminals(&model, &mesh, &state).expect("terminals").coils
+            });
+            for (a, b) in seen[0].iter().zip(&seen[1]) {
+                println!("{elements:?}: {a:?}");
+                for (a, b) in [(a.current, b.current), (a.flux_linkage, b.flux_linkage)] {
+                    assert!((a - b).norm() < 1e-9 * a.norm(), "{elements:?}: {a} {b}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn voltages_drive_the_currents_that_need_them_beside_saturated_iron() {
+    let mesh = bar_in_a_box();
+    let topology = mesh.topology();
+    let plate = topology.elements_of(topology.region("plate").expect("a region"));
+    for elements in ALL {
+        let of = |sources| crate::solved(&mesh, setup(&mesh, elements, (IRON, Some(curve())), sources));
+        let (given, state) = of((CURRENTS, [None; 2]));
+        let most = |b: &[c64; 3]| b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
+        let densities = state.flux_densities_of(&given, &mesh, &plate);
+        let most = densities.iter().map(most).fold(0.0, f64::max);
+        let needed = voltages(&given, &mesh, &state);
+        let losses: f64 = state.losses(&given, &mesh).iter().map(|(_, loss)| loss).sum();
+        println!(
+            "{elements:?}: up to {most:.2} T, {losses:.1} W, {needed:?} V, {} steps",
+            state.newton_steps()
+        );
+        assert!(most > 1.8, "it saturates");
+        let mixed = [[true, true], [true, false], [false, true]];
+        let cases = if elements.1 == Order::Linear { &mixed[..] } else { &mixed[..1] };
+        for driven in cases {
+            let currents = std::array::from_fn(|k| if driven[k] { c64::default() } else { CURRENTS[k] });
+            let sources = std::array::from_fn(|k| driven[k].then_some(needed[k]));
+            let (model, state) = of((currents, sources));
+            let seen = terminals(&model, &mesh, &state).expect("terminals");
+            for (coil, current) in seen.coils.iter().zip(CURRENTS) {
+                let off = (coil.current - current).norm() / current.norm();
+                println!("  {driven:?} {}: {off:.1e}, {} steps", coil.name, state.newton_steps());
+                assert!(off < 1e-8, "{elements:?} {driven:?}: {} for {current}", coil.current);
+            }
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_what_voltages_drive_beside_saturated_iron_match_differences() {
+    let mesh = bar_in_a_box();
+    let (moving, direction) = sway(&mesh);
+    for elements in [ALL[0], ALL[2]] {
+        let of = |sources| crate::solved(&mesh, setup(&mesh, elements, (IRON, Some(curve())), sources));
+        let (given, state) = of((CURRENTS, [None; 2]));
+        let needed = voltages(&given, &mesh, &state);
+        for sources in [(CURRENTS, [None; 2]), ([c64::default(); 2], needed.map(Some))] {
+            let is_driven = sources.1[0].is_some();
+            let (model, _) = of(sources);
+            let mut functionals = vec![
+                Functional::loss(&model, "bar").expect("it conducts"),
+                Functional::loss(&model, "plate").expect("it conducts"),
+                Functional::at_terminals(&model, "bar", AtTerminals::Power).expect("a winding"),
+                Functional::at_terminals(&model, "winding", AtTerminals::FluxLinkage).expect("a winding"),
+                Functional::at_terminals(&model, "bar", AtTerminals::Voltage).expect("a winding"),
+                Functional::energy(&model, None).expect("a model"),
+            ];
+            if is_driven {
+                functionals.push(
+                    Functional::at_terminals(&model, "winding", AtTerminals::Current).expect("a winding"),
+                );
+            }
+            let solve = |step: f64| {
+                let moved: Vec<Point> = direction.iter().map(|v| v.map(|c| step * c)).collect();
+                let mesh = mesh.moved(&moved).expect("small");
+                let (state, system) = model.solve(&mesh).expect("a field");
+                (mesh, state, system)
+            };
+            let step = 1e-6;
+            let (at, state, mut system) = solve(0.0);
+            let sides = [solve(step), solve(-step)];
+            for functional in functionals {
+                let value = functional.evaluate(&model, &at, &state).expect("finite");
+                let lambda = adjoint::solve(&mut system, &value.derivative).expect("an adjoint");
+                let mut gradient =
+                    adjoint::node_gradient(&model, &at, &state, &lambda, &moving).expect("one process");
+                let explicit = value.explicit.unwrap_or_default();
+                gradient
+                    .iter_mut()
+                    .zip(explicit)
+                    .for_each(|(sum, own)| (0..3).for_each(|d| sum[d] += own[d]));
+                let terms = gradient.iter().zip(&direction);
+                let exact: f64 = terms.map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum();
+                let [plus, minus] = sides
+                    .each_ref()
+                    .map(|(mesh, state, _)| functional.evaluate(&model, mesh, state).expect("finite").value);
+                let difference = (plus - minus) / (2.0 * step);
+                println!("{elements:?} {is_driven}: {exact:e} {:e}", difference / exact - 1.0);
+                // As where all is linear: truncation, and rounding of the solver over the step.
+                assert!((difference / exact - 1.0).abs() < 1e-6, "{elements:?}: {difference} {exact}");
+            }
+        }
+    }
+}
