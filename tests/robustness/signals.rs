@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use fluxmorph::Error;
-use fluxmorph::files::{RunStatus, system_disk};
+use fluxmorph::files::{RunResult, RunStatus, system_disk};
 use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::{Observer, RunObserver, Silent};
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -354,6 +354,29 @@ fn a_run_that_is_out_of_time_goes_on() {
     assert_eq!(rows(&out), 2);
     finish(resume(&out).args(["--max-time", "1 h"])).completed();
     assert_same(&essence(&files(&out)), &expected, "out of time");
+}
+
+/// Where nothing but the estimate of its error is left of a run, and a signal comes before that is done.
+#[test]
+fn an_estimate_after_the_search_that_is_interrupted_is_made_up_for() {
+    let home = folder();
+    let (mut config, source) = parsed(&changed(BLOCK, &[("max_evaluations = 6", "max_evaluations = 3")]));
+    let disk = system_disk();
+    config.output.verify_refinement = 1.0;
+    config.output.directory = home.path().join("whole");
+    let whole = run::run(&config, &source, options(&disk), &mut Silent).expect("it ends");
+    let estimate = |result: &RunResult| result.accuracy.as_ref().and_then(|own| own.error_estimate);
+    assert!(estimate(&whole).is_some());
+    config.output.directory = home.path().join("cut");
+    let signal = Cell::new(false);
+    let interrupted = || signal.get();
+    let asking = Options { interrupted: &interrupted, ..options(&disk) };
+    let mut observer = AtEstimate { before: 0, signal: &signal };
+    let cut = run::run(&config, &source, asking, &mut observer).expect("the search is complete");
+    assert!(cut.status == RunStatus::Interrupted && estimate(&cut).is_none(), "{:?}", cut.status);
+    let saved = SavedRun::open(&disk, &config.output.directory).expect("a run");
+    let resumed = run::resume(&saved, RunLimits::default(), options(&disk), &mut Silent).expect("it ends");
+    assert_eq!((resumed.objective, resumed.status), (whole.objective, whole.status));
 }
 
 /// Gives a signal as an estimate of the error begins.

@@ -80,6 +80,67 @@ fn walls_are_known_by_where_they_are() {
     assert_eq!(with_probe("-400 mm\"], [\"0 mm\", \"0 mm\", \"-300 mm").0, "z_min");
 }
 
+/// A slice of a long coil around a core: walls without a tangential field send its flux back beside it, however far they are; where the
+/// far ones have no condition it goes straight on, with the field `μ n I` inside.
+#[test]
+fn walls_that_send_back_the_flux_of_a_long_coil_are_named() {
+    let text = r#"
+[mesh]
+generator = "boxes"
+
+[mesh.boxes]
+box = [["0 mm", "0 mm", "0 mm"], ["400 mm", "400 mm", "5 mm"]]
+
+[[mesh.boxes.regions]]
+name = "core"
+box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "10 mm", "5 mm"]]
+size = ["5 mm", "5 mm", "5 mm"]
+
+[analysis]
+frequency = 0
+
+[materials.iron]
+relative_permeability = 1000
+
+[regions.core]
+material = "iron"
+
+[boundaries]
+flux_parallel = ["x_min", "y_min", "x_max", "y_max"]
+flux_normal = ["z_min", "z_max"]
+
+[[coils]]
+name = "coil"
+shape = "rectangular"
+center = ["0 mm", "0 mm", "2.5 mm"]
+half_window = ["20 mm", "20 mm"]
+width = "5 mm"
+height = "5 mm"
+ampere_turns = "5 A"
+
+[[probes]]
+name = "core"
+points = [["3 mm", "3 mm", "2.5 mm"]]
+"#;
+    let home = folder();
+    let config = home.path().join("slice.toml");
+    let far = ("\"y_min\", \"x_max\", \"y_max\"]", "\"y_min\"]");
+    for (changes, is_named) in [(&[][..], true), (&[far], false)] {
+        std::fs::write(&config, changed(text, changes)).expect("written");
+        let out = home.path().join(if is_named { "held" } else { "free" });
+        let said = finish(&mut command(&[&"solve", &config, &"--out", &out])).completed().stderr;
+        assert_eq!(
+            said.contains("between the planes `z_min` and `z_max`, which flux passes"),
+            is_named,
+            "{said}"
+        );
+        let b = number(&read_json(&out.join("result.json")), "/probes/0/b_re_t/0/2").abs();
+        let ratio = b / (4e-4 * std::f64::consts::PI * 1000.0);
+        println!("{is_named}: {ratio}");
+        assert!(if is_named { ratio < 0.9 } else { (ratio - 1.0).abs() < 1e-3 }, "{ratio}");
+    }
+}
+
 /// A ring coil of 40 mm in air.
 const RING: &str = r#"
 [mesh]

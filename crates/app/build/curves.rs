@@ -99,7 +99,8 @@ impl Curves {
             "iron with a B–H curve above 0 Hz: the largest and the least |B| of a period follow the curve, and of what alternates \
              the fundamental alone is computed (effective reluctivity). That is an approximation, which no error bar counts: far \
              beyond the knee, where the current is given and the field alternates in one direction, fluxes and voltages are up to \
-             21 % too low, mean forces and energies up to 50 %, and losses of eddy currents about 10 %"
+             21 % too low, mean forces and energies up to 50 %, and losses of eddy currents about 10 %; where a voltage gives the \
+             flux, the current is its peak, of which the fundamental may be a fifth"
                 .to_owned()
         });
         let of_curves = self.curves.iter().filter(|(name, _)| used(name));

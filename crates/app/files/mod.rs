@@ -148,7 +148,7 @@ fn advice(action: &str, path: &Path, error: &std::io::Error) -> &'static str {
             "choose a directory you may write to, for a new run with --out"
         }
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            "free some space, or keep fewer files with output.fields"
+            "free some space, or keep fewer files with output.fields and output.mesh"
         }
         ErrorKind::NotFound => "check that the path exists",
         ErrorKind::InvalidFilename => "take a shorter name",

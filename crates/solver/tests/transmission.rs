@@ -1,9 +1,10 @@
 //! What passes through a closed wall that its impedance surface stands for, against H. Kaden's shell (Wirbelströme und Schirmung in der
 //! Nachrichtentechnik, Springer 1959).
 
-use fluxmorph_geometry::RegionId;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{SphereParameters, sphere};
+use fluxmorph_geometry::tet4::norm;
+use fluxmorph_geometry::{NodeId, RegionId};
 use fluxmorph_solver::audit::transmissions;
 use fluxmorph_solver::{
     Boundary, Conductor, ElementFamily, FieldModelSetup, Material, SurfaceLaw, UniformField,
@@ -53,10 +54,10 @@ fn what_passes_through_a_closed_shell_is_about_the_field_in_it() {
             frequency,
             materials: vec![Material::AIR; 3],
             boundaries,
-            conductors: vec![Conductor { name: "shell".to_owned(), surface, law }],
+            conductors: vec![Conductor { name: "shell".to_owned(), surface: surface.clone(), law }],
             ..FieldModelSetup::default()
         };
-        let (model, solution) = solved(&mesh, setup);
+        let (model, solution) = solved(&mesh, setup.clone());
         // In the middle of the whole shell, beside the wall, and outside, where nothing passes from within, but the wall is seen
         // through itself.
         let places = [[0.0; 3], [0.01, 0.02, 0.03], [0.0, 0.0, 0.1]];
@@ -69,5 +70,14 @@ fn what_passes_through_a_closed_shell_is_about_the_field_in_it() {
         assert!((middle / exact - 1.0).abs() < 0.5, "{middle} {exact}");
         assert!((beside / exact - 1.0).abs() < 0.6, "{beside} {exact}");
         assert!(outside < 0.2 * exact && outside < 1e-3 * APPLIED, "{outside}");
+        // Of two layers each has one of the faces, and what passes comes out of the inner one.
+        let is_inner = |triangle: &[NodeId; 3]| norm(mesh.point(triangle[0])) < RADIUS - 0.5 * thickness;
+        let (inner, outer): (Vec<_>, Vec<_>) = surface.iter().copied().partition(is_inner);
+        let layer = |name: &str, surface| Conductor { name: name.to_owned(), surface, law };
+        let conductors = vec![layer("outer", outer), layer("inner", inner)];
+        let (model, solution) = solved(&mesh, FieldModelSetup { conductors, ..setup });
+        let layers = transmissions(&model, &mesh, &solution, &places[..1]);
+        let of_inner = layers.iter().find(|own| own.region == "inner").expect("it passes something");
+        assert!((of_inner.flux_densities[0] / middle - 1.0).abs() < 1e-6, "{layers:?}");
     }
 }

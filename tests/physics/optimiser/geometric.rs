@@ -143,6 +143,22 @@ fn linear_limits_and_bounds_keep_the_smooth_bound() {
         bound.limits(&vec![0.0; variables(&free.problem)]).is_none(),
         "the map decides about the upper face"
     );
+    // In its own plane it may slide.
+    let mut sliding = shield(&[MESHED[0], MESHED[1], "remesh.slide=[\"plate_top\"]"]);
+    bound.restrict(sliding.problem.shape_mut().expect("a shape"));
+    assert!(bound.limits(&vec![0.0; variables(&sliding.problem)]).is_some(), "it stays as far away");
+}
+
+/// A limit of micrometres is held as one of metres, to a hundredth.
+#[test]
+fn a_small_limit_gives_away_a_hundredth_of_itself() {
+    let setup = shield(&[]);
+    let p = vec![0.0; variables(&setup.problem)];
+    for limit in [3e-7, 3e-3] {
+        let (found, _) = evaluate(&setup, &bound_of(&setup, ThicknessLimit::Minimum(limit)), &p);
+        let given_away = found - (limit - 0.01);
+        assert!((given_away / (MARGIN * limit) - 1.0).abs() < 1e-6, "{limit}: {given_away}");
+    }
 }
 
 /// The upper face of the plate follows the elastic body.

@@ -95,6 +95,32 @@ fn every_body_has_its_own_thickness() {
 }
 
 /// A leg with both faces designed beside another one that is held: its own other face is nearer than the other leg.
+/// Plates side by side under one face: a node of both has the thickness of each.
+#[test]
+fn a_node_of_two_bodies_has_two_thicknesses() {
+    let air = [[-1.0, -0.5, -0.5], [2.0, 1.5, 1.5]];
+    let (thick, thin) = ([[0.0, 0.0, 0.2], [0.5, 1.0, 1.0]], [[0.5, 0.0, 0.6], [1.0, 1.0, 1.0]]);
+    for names in [["thick", "thin"], ["thin", "thick"]] {
+        let mut own = [("thick", thick), ("thin", thin)];
+        own.sort_by_key(|(name, _)| *name != names[0]);
+        let mesh = parts(air, 0.5, &own);
+        let surface = faces_at(&mesh, &[1.0], Direction::Along([0.0, 0.0, 1.0]));
+        let bodies = names.map(|name| mesh.topology().region(name).expect("it is meshed"));
+        let thickness = WallThickness::measure(&mesh, &bodies, &surface).expect("two plates");
+        let is_shared = |&n: &&NodeId| (mesh.point(*n)[0] - 0.5).abs() < 1e-12;
+        let shared = surface.nodes().iter().filter(is_shared).count();
+        assert!(shared > 0 && thickness.at_nodes().count() == surface.nodes().len() + shared);
+        let at_place = |n: NodeId| mesh.point(n);
+        for (i, least) in thickness.least_at_nodes(&surface, at_place) {
+            let expected = if mesh.point(surface.nodes()[i])[0] < 0.499 { 0.8 } else { 0.4 };
+            assert!((least - expected).abs() < 1e-12, "{least} for {expected}");
+        }
+        let least = thickness.least_of_bodies(&surface, at_place);
+        let of = |name: &str| least[&mesh.topology().region(name).expect("it is meshed")];
+        assert!((of("thick") - 0.8).abs() < 1e-12 && (of("thin") - 0.4).abs() < 1e-12, "{least:?}");
+    }
+}
+
 #[test]
 fn a_wall_ends_where_its_body_does_first() {
     let mesh = layers(&[("legs", [0.0, 0.1]), ("legs", [1.0, 1.2])]);
