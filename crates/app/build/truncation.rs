@@ -189,36 +189,42 @@ impl Truncation {
         let near = if is_plane_device(&sides) { NEAR_IN_A_PLANE } else { NEAR };
         let (surface, at_m) = name(&hull, side);
         let confined = return_path::confined(&sides, model, mesh);
-        let confined = confined.map(|planes| planes.map(|plane| name(&hull, plane).0));
+        let confined = confined.map(|planes| planes.map(|plane| named(&name(&hull, plane), "`")));
         Some(Self { surface, at_m, distance_m, source_size_m, near, confined })
     }
 
     /// Its name in marks or not, with the place of a side that has none.
     pub(crate) fn named(&self, mark: &str) -> String {
-        let place = self.at_m.map_or(String::new(), |place| format!(" at {}", millimetres(place)));
-        format!("{mark}{}{mark}{place}", self.surface)
+        named(&(self.surface.clone(), self.at_m), mark)
     }
 
     /// What no error bar counts, where walls send flux back, however far they are, or are near.
     pub(crate) fn described(&self) -> Option<String> {
-        if let Some([first, second]) = &self.confined {
-            return Some(format!(
-                "between the planes `{first}` and `{second}`, which flux passes, the sides are flux-parallel all round: they send \
-                 back beside the device all that passes it, however far they are, and no error bar counts that. Where the device goes \
-                 on alike beyond both planes with open space around it, as a long coil does, leave the far sides without a condition"
-            ));
-        }
+        let confined = self.confined.as_ref().map(|[first, second]| {
+            format!(
+                "between the planes {first} and {second}, which flux passes, the sides are flux-parallel all round: they send back \
+                 beside the device all that passes it, however far they are, and no error bar counts that. Where the device goes on \
+                 alike beyond both planes with open space around it, as a long coil does, leave the far sides without a condition"
+            )
+        });
         let Self { distance_m, source_size_m, near, .. } = self;
         let ratio = distance_m / source_size_m;
-        (ratio < *near).then(|| {
+        let near = (ratio < *near).then(|| {
             format!(
                 "the wall {} is {:.3} mm from coils, matter and what is observed, {ratio:.1} times their half \
                  diagonal: where it stands for open space, no error bar counts what it cuts off; walls farther off show how much that is",
                 self.named("`"),
                 Millimetres(*distance_m)
             )
-        })
+        });
+        confined.into_iter().chain(near).reduce(|first, second| format!("{first}; {second}"))
     }
+}
+
+/// The name of a side in marks or not, with the place of one that has none.
+fn named((name, place): &(String, Option<Point>), mark: &str) -> String {
+    let place = place.map_or(String::new(), |place| format!(" at {}", millimetres(place)));
+    format!("{mark}{name}{mark}{place}")
 }
 
 /// The sides of a mesh, and what they stand for; coordinates are off by `rounding` [m].

@@ -78,6 +78,8 @@ pub(super) struct Known<'a> {
     pub(super) errors: Option<[f64; 2]>,
     /// What impedance surfaces leave out of it at both [its unit].
     pub(super) excess: Option<[f64; 2]>,
+    /// Whether their estimate was cut short.
+    pub(super) is_cut_short: bool,
     /// How the mesh was refined.
     pub(super) refinements: Option<&'a Refinements>,
 }
@@ -89,7 +91,7 @@ impl Session<'_> {
     }
 
     /// Whether a run that ends by itself has its errors estimated.
-    pub(super) fn wants_errors(&self) -> bool {
+    pub(super) fn has_errors_estimated(&self) -> bool {
         let is_asked_for =
             self.config.output.verify_refinement != 0.0 || self.config.accuracy.tolerance.is_some();
         let constraints = self.setup.problem.constraints();
@@ -105,7 +107,7 @@ impl Session<'_> {
         at_best: Option<Estimate>,
         observer: &mut dyn Observer,
     ) -> Option<(ErrorEstimate, Estimate)> {
-        if self.is_cut_short(stop_reason) || !self.wants_errors() {
+        if self.is_cut_short(stop_reason) || !self.has_errors_estimated() {
             return None;
         }
         let (best, mut estimator) = (&best.analysis, self.estimator());
@@ -130,7 +132,7 @@ impl Session<'_> {
         known: &Known<'_>,
         observer: &mut dyn Observer,
     ) -> Option<Accuracy> {
-        let &Known { errors, excess, refinements } = known;
+        let &Known { errors, excess, refinements, .. } = known;
         let is_said = errors.is_some()
             || objective.is_verified_on_cut_elements()
             || self.is_geometry_looked_at() && self.is_checked(stop_reason);
@@ -178,7 +180,7 @@ impl Session<'_> {
         &self,
         accuracy: &Accuracy,
         (objective, stop_reason): (&ObjectiveResult, StopReason),
-        &Known { errors, excess, refinements }: &Known<'_>,
+        &Known { errors, excess, refinements, .. }: &Known<'_>,
         observer: &mut dyn Observer,
     ) -> Option<bool> {
         let of_facets = accuracy.facets.as_ref().map_or(Some([0.0; 2]), |facets| facets.change)?;

@@ -252,6 +252,7 @@ impl Session<'_> {
         self.keep_search(&mut result, observer)?;
         let mut seconds = 0.0;
         let errors = timed(&mut seconds, || self.estimate_errors(first, (best, reason), at_best, observer));
+        let is_cut_short = errors.is_none() && self.has_errors_estimated() && (self.interrupted)();
         result.timings_s.insert("estimate".to_owned(), seconds);
         result.timings_s.extend(refinement_seconds.map(|seconds| ("refinement".to_owned(), seconds)));
         if let Some((at_initial, at_best)) = &errors {
@@ -265,7 +266,7 @@ impl Session<'_> {
         drop(optimised);
         // The ranks' part of the problem goes with it.
         drop(recorder);
-        let known = Known { errors, excess, refinements: refinements.as_ref() };
+        let known = Known { errors, excess, is_cut_short, refinements: refinements.as_ref() };
         self.confirm(result, (&shapes, &meshes), &known, observer)
     }
 
@@ -414,7 +415,6 @@ impl Session<'_> {
             FreshMesh::of(self.config, &self.setup.problem)
         };
         let sizes = Sizes::of(&self.setup.problem);
-        let lacks_errors = known.errors.is_none() && self.wants_errors();
         self.setup.problem.release();
         let clock = Instant::now();
         let (config, source) = (self.config, self.source);
@@ -437,7 +437,7 @@ impl Session<'_> {
             result.accuracy = self.accuracy((objective, stop_reason, keeps_all), meshes, known, observer);
             let is_measured = |own: &CurvedFacets| own.change.is_some();
             let facets = result.accuracy.as_ref().and_then(|accuracy| accuracy.facets.as_ref());
-            if (lacks_errors || !facets.is_none_or(is_measured)) && (self.interrupted)() {
+            if (known.is_cut_short || !facets.is_none_or(is_measured)) && (self.interrupted)() {
                 result.status = RunStatus::Interrupted;
             }
         }

@@ -7,9 +7,10 @@
 //! `dF = 2 Re(dᵀ du)`, the adjoint law is the conjugate of the derivative along the conjugate: the same number `Re Lᵀ dH`, for
 //! the derivative is symmetric.
 //!
-//! Circuits stay linear. Their unknowns stand behind the field's, and a state on the way obeys their equations: the start is one that
-//! does, steps keep to them, and what GMRES sees are the rows of the field alone. Of inductive circuits the residual along a step still
-//! grows with its length: `Re dᴴF δ = −L_s|δ|²`; a capacitance in series may have several states beside iron (ferroresonance).
+//! Circuits stay linear. Their unknowns stand behind the field's, and a state on the way obeys their equations: the start is one
+//! that does, or is made one, steps keep to them, and what GMRES sees are the rows of the field alone. Of inductive circuits the
+//! residual along a step still grows with its length: `Re dᴴF δ = −L_s|δ|²`; a capacitance in series may have several states beside
+//! iron (ferroresonance).
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::scalar::{axpy, norm, ordered_sum};
@@ -44,6 +45,9 @@ const LOOSEST: f64 = 1e-2;
 
 /// Applications of the tangent for one system: some tens are usual, where the curve has its knee.
 const MOST_APPLICATIONS: usize = 400;
+
+/// A residual of circuits' equations [1] above which a state is first made one that obeys them: conductors have moved.
+const CONSISTENT: f64 = 1e-9;
 
 /// Which of the two derivatives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -238,7 +242,6 @@ struct Problem<'a> {
     load: Vec<c64>,
     /// Net currents [A] of solid conductors, behind the load.
     of_solids: Vec<c64>,
-    solids: SolidRows,
     circuits: Option<Equations>,
 }
 
@@ -246,8 +249,8 @@ impl<'a> Problem<'a> {
     fn new(model: &'a FieldModel, mesh: &'a Mesh) -> Self {
         let (mut load, solids) = (model.load(mesh), model.solid_rows(mesh));
         let of_solids = load.split_off(model.unknown_count());
-        let circuits = Equations::new(model.windings(), solids.clone(), model.angular_frequency());
-        Self { model, mesh, matrix: model.assemble(mesh), load, of_solids, solids, circuits }
+        let circuits = Equations::new(model.windings(), solids, model.angular_frequency());
+        Self { model, mesh, matrix: model.assemble(mesh), load, of_solids, circuits }
     }
 
     /// The load of the field with that of currents and voltages among some unknowns.
@@ -265,17 +268,27 @@ impl<'a> Problem<'a> {
         norm(&self.load) + of_circuits.unwrap_or_default()
     }
 
-    /// What some unknowns lack of the equations of circuits, and the largest of their parts [1].
-    fn lacking(&self, values: &[c64]) -> (Vec<c64>, f64) {
-        let of_circuits =
-            self.circuits.as_ref().map(|own| own.lacking(values.split_at(self.load.len()), &self.of_solids));
-        of_circuits.unwrap_or_default()
+    /// What some unknowns leave of the equations of circuits, as [`Equations::residual`] has it.
+    fn residual_of_circuits(&self, values: &[c64]) -> (Vec<c64>, f64) {
+        let of = |own: &Equations| own.residual(values.split_at(self.load.len()), &self.of_solids);
+        self.circuits.as_ref().map(of).unwrap_or_default()
     }
 
-    /// The state that some unknowns are.
-    fn state(&self, mut values: Vec<c64>, report: LinearSolverReport) -> FieldSolution {
-        let currents = values.split_off(self.load.len() + self.solids.count());
-        FieldSolution::state(values, report).with_currents(currents)
+    /// What solid conductors add to the matrix.
+    fn solids(&self) -> SolidRows {
+        self.circuits.as_ref().map(|own| own.solids().clone()).unwrap_or_default()
+    }
+
+    /// The state that some unknowns are, after so many steps and iterations, with the system for its adjoint.
+    fn ended(
+        &self,
+        mut values: Vec<c64>,
+        (steps, report): (usize, LinearSolverReport),
+        (system, tangent): (PreparedSystem, HarmonicTangent),
+    ) -> (FieldSolution, PreparedSystem) {
+        let currents = values.split_off(self.load.len() + self.solids().count());
+        let state = FieldSolution::state(values, report).with_currents(currents);
+        (state.after_newton(steps), system.with_tangent(tangent))
     }
 
     /// The system of the matrix that is nearest to a derivative.
@@ -285,7 +298,21 @@ impl<'a> Problem<'a> {
         systems: &mut StepSystems<'_>,
     ) -> Result<PreparedSystem, SolverError> {
         let matrix = self.model.with_tangents(&self.matrix, &tangent.tensors(), self.mesh);
-        systems.prepare((matrix, self.solids.clone()))
+        systems.prepare((matrix, self.solids()))
+    }
+
+    /// Whether what is left in the rows of the field is rounding, and nothing lowers it.
+    fn is_rounding(
+        &self,
+        iterate: &Iterate,
+        step: &[c64],
+        (system, systems): (&PreparedSystem, &StepSystems<'_>),
+    ) -> bool {
+        let (count, load) = (self.load.len(), self.load_of(&iterate.values));
+        let residual: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
+        let (solution, step) = (&iterate.values[..count], &step[..count]);
+        let left = |matrix| Left { matrix, load: &load, solution, residual: &residual, step };
+        systems.is_rounding(system.method(), system.matrix().map(left))
     }
 
     /// Some unknowns with their residual.
@@ -308,15 +335,14 @@ impl<'a> Problem<'a> {
 
     /// Where to start: the field of the linear parts that circuits drive, and a share of that of given currents, as in statics.
     fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
-        let mut system = systems.prepare((self.matrix.clone(), self.solids.clone()))?;
+        let mut system = systems.prepare((self.matrix.clone(), self.solids()))?;
         let (mut values, report, currents) = system.solve_with(&self.load, Excitation::Given(&[]))?;
         values.extend(currents);
         let mut driven = vec![c64::default(); self.load.len()];
         if self.circuits.is_some() {
             driven.extend(&self.of_solids);
-            let currents;
-            (driven, _, currents) = system.solve_with(&driven, Excitation::Voltages)?;
-            driven.extend(currents);
+            let (field, _, currents) = system.solve_with(&driven, Excitation::Voltages)?;
+            driven = [field, currents].concat();
         }
         let driven = self.at(driven);
         let found = self.search(&driven, &values, &mut system)?;
@@ -408,55 +434,54 @@ pub(crate) fn solve(
             (iterate, iterations, 1)
         }
     };
-    let mut damping = 1.0;
+    let (mut damping, mut is_consistent) = (1.0, false);
     loop {
-        let (scale, (lacking, of_circuits)) =
-            (problem.scale(&iterate.values), problem.lacking(&iterate.values));
-        let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 }.max(of_circuits);
+        let (scale, (of_circuits, worst)) =
+            (problem.scale(&iterate.values), problem.residual_of_circuits(&iterate.values));
+        let residual = if scale > 0.0 { norm(&iterate.residual) / scale } else { 0.0 }.max(worst);
         observer(NewtonProgress { steps, residual, energy: None, damping });
         let tangent = problem.tangent(&iterate.values);
         let mut system = problem.nearest(&tangent, systems)?;
-        let verdict = descent.after(residual);
-        if systems.is_state(verdict, residual, system.method()) {
-            let report = LinearSolverReport { iterations, residual };
-            let state = problem.state(iterate.values, report).after_newton(steps);
-            return Ok((state, system.with_tangent(tangent)));
-        }
         let mut right_side: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
-        right_side.extend(lacking);
+        right_side.extend(of_circuits);
+        if worst > CONSISTENT && !is_consistent {
+            right_side[..problem.load.len()].fill(c64::default());
+            let (mut values, _) = system.solve_once(&right_side)?;
+            axpy(c64::from(1.0), &iterate.values, &mut values);
+            systems.keep(system.into_field());
+            (iterate, is_consistent) = (problem.at(values), true);
+            continue;
+        }
+        let verdict = descent.after(residual);
+        let report = LinearSolverReport { iterations, residual };
+        if systems.is_state(verdict, residual, system.method()) {
+            return Ok(problem.ended(iterate.values, (steps, report), (system, tangent)));
+        }
         // As exact as the next residual is small.
         let tolerance = residual.min(LOOSEST).max(0.1 * settings.tolerance / residual);
-        let (step, report) = tangent.invert(Side::State, &right_side, &mut system, tolerance)?;
+        let (step, LinearSolverReport { iterations: own, .. }) =
+            tangent.invert(Side::State, &right_side, &mut system, tolerance)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on { problem.search(&iterate, &step, &mut system)? } else { None };
         let Some((next, length)) = found else {
-            let count = problem.load.len();
-            let load = problem.load_of(&iterate.values);
-            let (solution, residual_of_field) = (&iterate.values[..count], &right_side[..count]);
-            let left = |matrix| Left {
-                matrix,
-                load: &load,
-                solution,
-                residual: residual_of_field,
-                step: &step[..count],
-            };
-            let is_state = systems.is_rounding(system.method(), system.matrix().map(left));
+            let is_state =
+                worst <= settings.required && problem.is_rounding(&iterate, &step, (&system, systems));
             systems.keep(system.into_field());
             if is_state {
                 let system = problem.nearest(&tangent, systems)?;
-                let report = LinearSolverReport { iterations, residual };
-                let state = problem.state(iterate.values, report).after_newton(steps);
-                return Ok((state, system.with_tangent(tangent)));
+                return Ok(problem.ended(iterate.values, (steps, report), (system, tangent)));
             }
             let mut values = iterate.values.clone();
             axpy(c64::from(1.0), &step, &mut values);
-            values.truncate(count);
-            iterate.values.truncate(count);
-            let [from, to] = [iterate.values, values].map(FieldSolution::of_state);
+            let of_field = |mut values: Vec<c64>| {
+                values.truncate(problem.load.len());
+                FieldSolution::of_state(values)
+            };
+            let [from, to] = [iterate.values, values].map(of_field);
             return Err(newton::refused(model, mesh, (steps, residual), &from, &to));
         };
         systems.keep(system.into_field());
-        iterations += report.iterations;
+        iterations += own;
         (steps, damping, iterate) = (steps + 1, length, next);
     }
 }

@@ -27,9 +27,9 @@ impl FieldModel {
     }
 
     /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the
-    /// adjoint. Of `cache` the method that worked last takes part, and what is kept of factors; Newton's method begins with `start`, the
-    /// [`unknowns`](FieldSolution::unknowns) of a similar state, and where there is none with the field of the linear parts. Where its residual stays for rounding a more
-    /// robust method of the linear solver follows.
+    /// adjoint. Of `cache` the method that worked last takes part, and what is kept of factors; Newton's method begins with `start`,
+    /// the [`unknowns`](FieldSolution::unknowns) of a similar state, and where there is none with the field of the linear parts.
+    /// Where its residual stays for rounding a more robust method of the linear solver follows.
     ///
     /// # Errors
     /// [`SolverError::Newton`], and those of [`PreparedSystem::solve`].

@@ -167,7 +167,7 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
                 "`{path}` is of inductances, which a B–H curve does not have: they depend on the current"
             );
             let fault = source.diagnostic(&format!("{path}.kind"), message);
-            let instead = "flux_linkage, power or loss, or materials with a permeability";
+            let instead = "flux_linkage, above 0 Hz power or loss, or materials with a permeability";
             faults.push(fault.expected(instead));
         }
     }

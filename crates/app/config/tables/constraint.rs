@@ -24,8 +24,9 @@ table! {
     ///
     /// The bounds on a thickness are on the safe side by a hundredth of them: the true least thickness is a little greater, the
     /// greatest a little smaller. A search keeps them as bounds on the variables or as linear limits at every node, up to a
-    /// thousand of these; where the mesh motion decides about the opposite face, as one smooth function, and is slow along it. With
-    /// both `minimum` and `maximum` one entry makes two constraints, with `_minimum` and `_maximum` behind their names.
+    /// thousand of these; where the mesh motion decides how far away the opposite face is, as one smooth function, and is slow
+    /// along it. With both `minimum` and `maximum` one entry makes two constraints, with `_minimum` and `_maximum` behind their
+    /// names.
     ///
     /// ```toml
     /// [[constraints]]

@@ -105,8 +105,8 @@ impl WallThickness {
         };
         let nodes = surface.nodes().iter().zip(surface.directions());
         let by_node = nodes.map(opposite_of).collect::<Option<Vec<_>>>()?;
-        let placed = |(i, found): (usize, Vec<Opposite>)| found.into_iter().map(move |own| (i, own));
-        let opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(placed).collect();
+        let with_place = |(i, found): (usize, Vec<Opposite>)| found.into_iter().map(move |own| (i, own));
+        let opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(with_place).collect();
         (!opposite.is_empty()).then_some(Self { opposite })
     }
 

@@ -170,7 +170,7 @@ pub fn skin_audit(
     };
     let nodes: Vec<[NodeId; 3]> = faces.iter().map(|face| face.nodes).collect();
     let inwards: Vec<[Point; 3]> = faces.iter().map(|face| face.inwards(mesh)).collect();
-    let walls = walls::walls(&inwards, IMPEDANCE_THICKNESS * skin_depth);
+    let walls = walls::walls(&inwards, inwards.len(), IMPEDANCE_THICKNESS * skin_depth);
     let thin =
         || faces.iter().zip(&walls).filter_map(|(face, wall)| Some((face.area, wall.as_ref()?.thickness)));
     let thin_share = thin().map(|(area, _)| area).sum::<f64>() / surface;

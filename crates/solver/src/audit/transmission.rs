@@ -71,8 +71,8 @@ pub fn transmissions(
             let Some(Wall { thickness, opposite }) = *wall else { return 0.0 };
             2.0 * (-thickness / skin_depth).exp() * across(&faces[opposite])
         };
-        let walls = walls(&corners, THICKEST * skin_depth);
-        let exits: Vec<Exit> = corners[..conductor.surface.len()]
+        let walls = walls(&corners, conductor.surface.len(), THICKEST * skin_depth);
+        let exits: Vec<Exit> = corners
             .iter()
             .zip(&walls)
             .map(|(&corners, wall)| Exit { corners, flux_density: behind(wall) })

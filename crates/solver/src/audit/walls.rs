@@ -15,9 +15,9 @@ pub(super) struct Wall {
     pub(super) opposite: usize,
 }
 
-/// The wall under every triangle of a surface that is oriented into its body; `None` where it is thicker than `most` [m], or ends at a
-/// symmetry plane.
-pub(super) fn walls(corners: &[[Point; 3]], most: f64) -> Vec<Option<Wall>> {
+/// The wall under each of the first triangles of a surface that is oriented into its body; `None` where it is thicker than `most` [m],
+/// or ends at a symmetry plane.
+pub(super) fn walls(corners: &[[Point; 3]], first: usize, most: f64) -> Vec<Option<Wall>> {
     let tree = BoxTree::new(corners.iter().map(reach).collect());
     let of = |own: &[Point; 3]| {
         let (origin, direction) = (centroid(*own), unit(area_vector(*own)));
@@ -30,7 +30,7 @@ pub(super) fn walls(corners: &[[Point; 3]], most: f64) -> Vec<Option<Wall>> {
         let met = tree.hits(origin, direction).into_iter().filter_map(meets);
         met.min_by(|a, b| a.thickness.total_cmp(&b.thickness))
     };
-    corners.par_iter().map(of).collect()
+    corners[..first].par_iter().map(of).collect()
 }
 
 #[cfg(test)]
@@ -50,7 +50,7 @@ mod tests {
             [high[0], high[2], high[1]],
             [high[0], high[3], high[2]],
         ];
-        let found = walls(&faces, 2.0);
+        let found = walls(&faces, 4, 2.0);
         for (face, wall) in faces.iter().zip(&found).take(2) {
             let wall = wall.expect("a face above");
             assert!(
@@ -60,7 +60,8 @@ mod tests {
         }
         // Rays from the slanted faces lean: one of them passes the rim.
         assert!(
-            found[3].is_some_and(|wall| wall.opposite < 2) && walls(&faces, 0.6).iter().all(Option::is_none),
+            found[3].is_some_and(|wall| wall.opposite < 2)
+                && walls(&faces, 4, 0.6).iter().all(Option::is_none),
             "{found:?}"
         );
     }

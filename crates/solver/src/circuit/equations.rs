@@ -94,16 +94,29 @@ impl Equations {
         self.loads().zip(y).map(|(load, y)| y.norm() * norm(load)).sum()
     }
 
-    /// What a state of these unknowns lacks of the circuits' equations, written symmetrically, and the largest of their parts [1].
-    pub(crate) fn lacking(&self, (u, y): (&[c64], &[c64]), of_solids: &[c64]) -> (Vec<c64>, f64) {
-        let mut most: f64 = 0.0;
+    /// What is left of the circuits' equations with these unknowns, written symmetrically, with the sign of a right side; and the
+    /// largest of these over its parts [1], whatever of them cancels.
+    pub(crate) fn residual(&self, (u, y): (&[c64], &[c64]), of_solids: &[c64]) -> (Vec<c64>, f64) {
+        let block = self.block();
         let right = self.right_sides(of_solids, Excitation::Voltages);
-        let rows = self.loads().zip(self.block()).zip(right).map(|((load, row), r)| {
-            let terms = row.iter().zip(y).map(|(entry, y)| -entry * y).chain([r, -product(load, u)]);
-            let (sum, size) =
-                terms.fold((c64::default(), 0.0), |(sum, size), term| (sum + term, size + term.norm()));
-            most = most.max(if size > 0.0 { sum.norm() / size } else { 0.0 });
-            -sum
+        let uncancelled =
+            |load: &[c64]| -> f64 { load.iter().zip(u).map(|(load, u)| load.norm() * u.norm()).sum() };
+        let of_field: Vec<f64> = self.loads().map(uncancelled).collect();
+        // A voltage between what drives a conductor and what its eddy currents take may be rounding of both.
+        let solids = self.solids.count();
+        let least = |j: usize| {
+            if j < solids { (of_field[j] + right[j].norm()) / block[j][j].norm() } else { 0.0 }
+        };
+        let sizes: Vec<f64> = y.iter().enumerate().map(|(j, y)| y.norm().max(least(j))).collect();
+        let mut most: f64 = 0.0;
+        let rows = self.loads().zip(&block).zip(&right).zip(&of_field);
+        let rows = rows.map(|(((load, row), r), of_field)| {
+            let of_circuits: c64 = row.iter().zip(y).map(|(entry, y)| entry * y).sum();
+            let size: f64 = row.iter().zip(&sizes).map(|(entry, size)| entry.norm() * size).sum();
+            let left = product(load, u) + of_circuits - r;
+            let size = size + of_field + r.norm();
+            most = most.max(if size > 0.0 { left.norm() / size } else { 0.0 });
+            left
         });
         let rows = rows.collect();
         (rows, most)

@@ -10,11 +10,11 @@
 //! derivative of `K` remains all there is. It is solved by eliminating `u`: one further solution a coil. All values are those
 //! of the meshed part. At 0 Hz a voltage drives `V/R`. A solid conductor is a coil of one turn, whose `λ = V/(jω)` is itself an
 //! unknown of the field (`solids`).
-//! Lives here: windings (`mod`), their equations (`equations`), the elimination (`border`), solid conductors (`solids`), what the terminals see (`terminals`). Does not live here: the loads
-//! (`crate::load`), functionals of terminals and inductances (`crate::functional`).
+//! Lives here: windings (`mod`), their equations (`equations`), the elimination (`border`), solid conductors (`solids`), what the
+//! terminals see (`terminals`). Does not live here: the loads (`crate::load`), functionals of terminals and inductances (`crate::functional`).
 
 mod border;
-pub(crate) mod equations;
+mod equations;
 pub(crate) mod solids;
 mod terminals;
 

@@ -14,6 +14,7 @@
 
 use std::collections::HashSet;
 use std::ops::Range;
+use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId};
@@ -53,7 +54,7 @@ pub(crate) struct Solids {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SolidRows {
     /// `−c`: the load of `U = 1 Wb`.
-    pub(super) loads: Vec<Vec<c64>>,
+    pub(super) loads: Arc<Vec<Vec<c64>>>,
     /// `d` [S s].
     pub(super) diagonal: Vec<c64>,
 }
@@ -126,21 +127,19 @@ impl Solids {
         mut times: impl FnMut(ElementId, &Local) -> Local,
         mut scatter: impl FnMut(ElementId, &Local, &mut [c64]),
     ) -> SolidRows {
-        let mut rows = SolidRows {
-            loads: vec![vec![c64::default(); unknown_count]; self.count()],
-            diagonal: vec![c64::default(); self.count()],
-        };
+        let mut loads = vec![vec![c64::default(); unknown_count]; self.count()];
+        let mut diagonal = vec![c64::default(); self.count()];
         for (e, gradient) in &self.gradients {
             let mut one = Local::new(MOST, |_| [c64::default(); 4]);
             for (carrier, g) in gradient.coefficients.into_iter().enumerate() {
                 one.add(carrier, self.component, g.into());
             }
             let image = times(*e, &one);
-            rows.diagonal[gradient.conductor] += self.product(gradient, image.values());
-            scatter(*e, &image, &mut rows.loads[gradient.conductor]);
+            diagonal[gradient.conductor] += self.product(gradient, image.values());
+            scatter(*e, &image, &mut loads[gradient.conductor]);
         }
-        rows.loads.iter_mut().flatten().for_each(|value| *value = -*value);
-        rows
+        loads.iter_mut().flatten().for_each(|value| *value = -*value);
+        SolidRows { loads: Arc::new(loads), diagonal }
     }
 }
 

@@ -90,6 +90,31 @@ fn a_straight_table_beside_circuits_is_the_linear_material() {
     }
 }
 
+/// Of a short circuit nothing is left but what cancels: as beside the linear material, and beside saturated iron.
+#[test]
+fn what_is_short_circuited_beside_a_curve_has_a_state() {
+    let mesh = bar_in_a_box();
+    let straight =
+        BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * IRON.reluctivity(), b])).expect("a sound table");
+    for (shorted, share) in [(0, 1e-4), (1, 1e-4), (0, 1.0), (1, 1.0)] {
+        let mut currents = CURRENTS.map(|current| share * current);
+        currents[shorted] = c64::default();
+        let law = if share < 1.0 { straight.clone() } else { curve() };
+        let seen = [None, Some(law)].map(|curve| {
+            let mut setup = setup(&mesh, ALL[2], (IRON, curve), (currents, [None; 2]));
+            let turns = SERIES[shorted].turns;
+            setup.windings[shorted] = Some(Winding { turns, voltage: Some(c64::default()), ..NO_CIRCUIT });
+            let (model, state) = crate::solved(&mesh, setup);
+            println!("{shorted}: {} steps, {:.1e}", state.newton_steps(), state.report().residual);
+            assert!(state.report().residual < 1e-10);
+            terminals(&model, &mesh, &state).expect("terminals").coils
+        });
+        let [linear, curved] = [&seen[0], &seen[1]].map(|coils| coils[shorted].current);
+        let off = (linear - curved).norm() / linear.norm();
+        assert!(if share < 1.0 { off < 1e-9 } else { off > 1e-6 }, "{shorted}: {linear} {curved}");
+    }
+}
+
 #[test]
 fn voltages_drive_the_currents_that_need_them_beside_saturated_iron() {
     let mesh = bar_in_a_box();

@@ -94,7 +94,6 @@ fn every_body_has_its_own_thickness() {
     }
 }
 
-/// A leg with both faces designed beside another one that is held: its own other face is nearer than the other leg.
 /// Plates side by side under one face: a node of both has the thickness of each.
 #[test]
 fn a_node_of_two_bodies_has_two_thicknesses() {
@@ -121,6 +120,7 @@ fn a_node_of_two_bodies_has_two_thicknesses() {
     }
 }
 
+/// A leg with both faces designed beside another one that is held: its own other face is nearer than the other leg.
 #[test]
 fn a_wall_ends_where_its_body_does_first() {
     let mesh = layers(&[("legs", [0.0, 0.1]), ("legs", [1.0, 1.2])]);
