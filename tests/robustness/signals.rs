@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use fluxmorph::Error;
-use fluxmorph::files::{RunResult, RunStatus, system_disk};
+use fluxmorph::files::{RunDirectory, RunResult, RunStatus, system_disk};
 use fluxmorph::run::{self, Options, RunLimits, SavedRun};
 use fluxmorph::show::{Observer, RunObserver, Silent};
 use fluxmorph_optimizer::Error as OptimizerError;
@@ -370,9 +370,12 @@ fn an_estimate_after_the_search_that_is_interrupted_is_made_up_for() {
     config.output.directory = home.path().join("cut");
     let signal = Cell::new(false);
     let interrupted = || signal.get();
-    let asking = Options { interrupted: &interrupted, ..options(&disk) };
-    let mut observer = AtEstimate { before: 0, signal: &signal };
-    let cut = run::run(&config, &source, asking, &mut observer).expect("the search is complete");
+    let searched = |_: &RunDirectory| {
+        signal.set(true);
+        None
+    };
+    let asking = Options { interrupted: &interrupted, searched: &searched, ..options(&disk) };
+    let cut = run::run(&config, &source, asking, &mut Silent).expect("the search is complete");
     assert!(cut.status == RunStatus::Interrupted && estimate(&cut).is_none(), "{:?}", cut.status);
     let saved = SavedRun::open(&disk, &config.output.directory).expect("a run");
     let resumed = run::resume(&saved, RunLimits::default(), options(&disk), &mut Silent).expect("it ends");

@@ -333,6 +333,14 @@ impl<'a> Problem<'a> {
         Iterate { values, residual }
     }
 
+    /// Why there is no state: what a step would change most.
+    fn refused(&self, at: (usize, f64), values: &[c64], step: &[c64]) -> SolverError {
+        let count = self.load.len();
+        let [from, to] = [values[..count].to_vec(), sum(&values[..count], &step[..count])];
+        let [from, to] = [from, to].map(FieldSolution::of_state);
+        newton::refused(self.model, self.mesh, at, &from, &to)
+    }
+
     /// Where to start: the field of the linear parts that circuits drive, and a share of that of given currents, as in statics.
     fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
         let mut system = systems.prepare((self.matrix.clone(), self.solids()))?;
@@ -413,6 +421,11 @@ impl<'a> Problem<'a> {
     }
 }
 
+/// `a + b`
+fn sum(a: &[c64], b: &[c64]) -> Vec<c64> {
+    a.iter().zip(b).map(|(a, b)| a + b).collect()
+}
+
 /// Solves the state problem of a time-harmonic model with B–H laws; also returns the system with the derivative in that state,
 /// for the adjoint.
 ///
@@ -446,10 +459,9 @@ pub(crate) fn solve(
         right_side.extend(of_circuits);
         if worst > CONSISTENT && !is_consistent {
             right_side[..problem.load.len()].fill(c64::default());
-            let (mut values, _) = system.solve_once(&right_side)?;
-            axpy(c64::from(1.0), &iterate.values, &mut values);
+            let (change, _) = system.solve_once(&right_side)?;
             systems.keep(system.into_field());
-            (iterate, is_consistent) = (problem.at(values), true);
+            (iterate, is_consistent) = (problem.at(sum(&iterate.values, &change)), true);
             continue;
         }
         let verdict = descent.after(residual);
@@ -471,14 +483,7 @@ pub(crate) fn solve(
                 let system = problem.nearest(&tangent, systems)?;
                 return Ok(problem.ended(iterate.values, (steps, report), (system, tangent)));
             }
-            let mut values = iterate.values.clone();
-            axpy(c64::from(1.0), &step, &mut values);
-            let of_field = |mut values: Vec<c64>| {
-                values.truncate(problem.load.len());
-                FieldSolution::of_state(values)
-            };
-            let [from, to] = [iterate.values, values].map(of_field);
-            return Err(newton::refused(model, mesh, (steps, residual), &from, &to));
+            return Err(problem.refused((steps, residual), &iterate.values, &step));
         };
         systems.keep(system.into_field());
         iterations += own;
