@@ -189,13 +189,17 @@ impl Truncation {
         let near = if is_plane_device(&sides) { NEAR_IN_A_PLANE } else { NEAR };
         let (surface, at_m) = name(&hull, side);
         let confined = return_path::confined(&sides, model, mesh);
-        let confined = confined.map(|planes| planes.map(|plane| named(&name(&hull, plane), "`")));
+        let in_words = |plane| {
+            let (surface, at_m) = name(&hull, plane);
+            named(&surface, at_m, "`")
+        };
+        let confined = confined.map(|planes| planes.map(in_words));
         Some(Self { surface, at_m, distance_m, source_size_m, near, confined })
     }
 
     /// Its name in marks or not, with the place of a side that has none.
     pub(crate) fn named(&self, mark: &str) -> String {
-        named(&(self.surface.clone(), self.at_m), mark)
+        named(&self.surface, self.at_m, mark)
     }
 
     /// What no error bar counts, where walls send flux back, however far they are, or are near.
@@ -222,9 +226,9 @@ impl Truncation {
 }
 
 /// The name of a side in marks or not, with the place of one that has none.
-fn named((name, place): &(String, Option<Point>), mark: &str) -> String {
+fn named(surface: &str, place: Option<Point>, mark: &str) -> String {
     let place = place.map_or(String::new(), |place| format!(" at {}", millimetres(place)));
-    format!("{mark}{name}{mark}{place}")
+    format!("{mark}{surface}{mark}{place}")
 }
 
 /// The sides of a mesh, and what they stand for; coordinates are off by `rounding` [m].

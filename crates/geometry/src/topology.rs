@@ -3,7 +3,7 @@
 //! Lives here: which nodes make which tetrahedron, which elements make which region, the faces between regions and at
 //! the outside, and the incidence node → elements. Does not live here: any coordinate (see [`crate::Mesh`]).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::error::MeshError;
 use crate::facets::find_facets;
@@ -27,6 +27,15 @@ pub fn edge_key([a, b]: [NodeId; 2]) -> [NodeId; 2] {
 /// The edges of a triangle, each with ascending nodes.
 pub fn triangle_edges([a, b, c]: [NodeId; 3]) -> [[NodeId; 2]; 3] {
     [[a, b], [b, c], [c, a]].map(edge_key)
+}
+
+/// The edges that only one of some triangles has.
+pub fn rim_edges(triangles: &[[NodeId; 3]]) -> BTreeSet<[NodeId; 2]> {
+    let mut count: BTreeMap<[NodeId; 2], usize> = BTreeMap::new();
+    for edge in triangles.iter().flat_map(|t| triangle_edges(*t)) {
+        *count.entry(edge).or_default() += 1;
+    }
+    count.into_iter().filter(|&(_, n)| n == 1).map(|(edge, _)| edge).collect()
 }
 
 /// Whether two orders of the same three nodes have the same normal.

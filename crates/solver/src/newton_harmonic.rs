@@ -304,14 +304,12 @@ impl<'a> Problem<'a> {
     /// Whether what is left in the rows of the field is rounding, and nothing lowers it.
     fn is_rounding(
         &self,
-        iterate: &Iterate,
-        step: &[c64],
+        [values, right_side, step]: [&[c64]; 3],
         (system, systems): (&PreparedSystem, &StepSystems<'_>),
     ) -> bool {
-        let (count, load) = (self.load.len(), self.load_of(&iterate.values));
-        let residual: Vec<c64> = iterate.residual.iter().map(|r| -r).collect();
-        let (solution, step) = (&iterate.values[..count], &step[..count]);
-        let left = |matrix| Left { matrix, load: &load, solution, residual: &residual, step };
+        let load = self.load_of(values);
+        let [solution, residual, step] = [values, right_side, step].map(|all| &all[..load.len()]);
+        let left = |matrix| Left { matrix, load: &load, solution, residual, step };
         systems.is_rounding(system.method(), system.matrix().map(left))
     }
 
@@ -344,8 +342,7 @@ impl<'a> Problem<'a> {
     /// Where to start: the field of the linear parts that circuits drive, and a share of that of given currents, as in statics.
     fn start(&self, systems: &mut StepSystems<'_>) -> Result<(Iterate, usize), SolverError> {
         let mut system = systems.prepare((self.matrix.clone(), self.solids()))?;
-        let (mut values, report, currents) = system.solve_with(&self.load, Excitation::Given(&[]))?;
-        values.extend(currents);
+        let (values, report) = system.solve_all(&self.load)?;
         let mut driven = vec![c64::default(); self.load.len()];
         if self.circuits.is_some() {
             driven.extend(&self.of_solids);
@@ -476,8 +473,8 @@ pub(crate) fn solve(
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on { problem.search(&iterate, &step, &mut system)? } else { None };
         let Some((next, length)) = found else {
-            let is_state =
-                worst <= settings.required && problem.is_rounding(&iterate, &step, (&system, systems));
+            let left = [&iterate.values[..], &right_side, &step];
+            let is_state = worst <= settings.required && problem.is_rounding(left, (&system, systems));
             systems.keep(system.into_field());
             if is_state {
                 let system = problem.nearest(&tangent, systems)?;

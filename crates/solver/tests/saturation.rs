@@ -28,12 +28,17 @@ fn mesh() -> Mesh {
 }
 
 /// A law that saturates at 1.8 T with an initial permeability of 2000, in steps of a tenth of its field strength.
-fn law() -> BhCurve {
+pub(crate) fn law() -> BhCurve {
     let point = |i: i32| {
         let h = 20.0 * (1.3_f64.powi(i) - 1.0);
         [h, VACUUM_PERMEABILITY * h + 1.8 * (1.0 - (-h / 700.0).exp())]
     };
     BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table")
+}
+
+/// The law of a linear material as a table.
+pub(crate) fn straight(material: Material) -> BhCurve {
+    BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * material.reluctivity(), b])).expect("a sound table")
 }
 
 fn setup((family, order): (ElementFamily, Order), iron: Material, bh: Option<BhCurve>) -> FieldModelSetup {
@@ -66,8 +71,7 @@ fn off(field: &[Complex3], factor: c64, other: &[Complex3]) -> f64 {
 fn a_straight_table_gives_the_field_of_the_linear_material() {
     let mesh = mesh();
     let steel = Material { relative_permeability: 500.0, conductivity: 0.0 };
-    let straight =
-        BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * steel.reluctivity(), b])).expect("a sound table");
+    let straight = straight(steel);
     for elements in ALL {
         // Of nodal elements with the same penalty, of edge elements with any linear part.
         let part = if elements.0 == ElementFamily::Nodal { steel } else { SOFT };
@@ -228,8 +232,7 @@ fn derivatives_match(frequency: f64, iron_material: Material, families: &[(Eleme
 fn a_straight_table_gives_the_phasor_of_the_linear_material() {
     let mesh = mesh();
     let steel = Material { relative_permeability: 500.0, conductivity: 2e6 };
-    let straight =
-        BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * steel.reluctivity(), b])).expect("a sound table");
+    let straight = straight(steel);
     for elements in ALL {
         let part =
             if elements.0 == ElementFamily::Nodal { steel } else { Material { conductivity: 2e6, ..SOFT } };

@@ -1,9 +1,9 @@
 //! The boundary edges of the design surface: which are free, and which lie on a symmetry plane, where only the model ends.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::topology::triangle_edges;
+use fluxmorph_geometry::topology::{rim_edges, triangle_edges};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use super::symmetry_planes::SymmetryPlanes;
@@ -21,12 +21,7 @@ pub(super) struct BoundaryEdges {
 impl BoundaryEdges {
     /// The boundary edges of `triangles`; `cuts` are the faces where the model ends.
     pub(super) fn new(triangles: &[[NodeId; 3]], cuts: &[[NodeId; 3]]) -> Self {
-        let mut count: BTreeMap<Edge, usize> = BTreeMap::new();
-        for edge in triangles.iter().flat_map(|t| triangle_edges(*t)) {
-            *count.entry(edge).or_default() += 1;
-        }
-        let boundary: BTreeSet<Edge> =
-            count.into_iter().filter(|&(_, n)| n == 1).map(|(edge, _)| edge).collect();
+        let boundary = rim_edges(triangles);
         let cut: BTreeSet<Edge> =
             cuts.iter().flat_map(|t| triangle_edges(*t)).filter(|edge| boundary.contains(edge)).collect();
         let free = boundary.difference(&cut).flatten().copied().collect();

@@ -144,12 +144,7 @@ impl WallThickness {
         surface: &DesignSurface,
         place: impl Fn(NodeId) -> Point,
     ) -> BTreeMap<usize, f64> {
-        let mut least = BTreeMap::new();
-        for (i, wall) in self.walls(surface, place) {
-            let own = least.entry(i).or_insert(wall.thickness);
-            *own = wall.thickness.min(*own);
-        }
-        least
+        least_of(self.walls(surface, place))
     }
 
     /// The same at every node of a moved mesh, shape `(n_nodes,)`; zero where none is measured.
@@ -168,13 +163,8 @@ impl WallThickness {
         surface: &DesignSurface,
         place: impl Fn(NodeId) -> Point,
     ) -> BTreeMap<RegionId, f64> {
-        let mut least = BTreeMap::new();
         let bodies = self.opposite.iter().map(|(_, opposite)| opposite.body);
-        for ((_, wall), body) in self.walls(surface, place).zip(bodies) {
-            let own = least.entry(body).or_insert(f64::INFINITY);
-            *own = wall.thickness.min(*own);
-        }
-        least
+        least_of(bodies.zip(self.walls(surface, place).map(|(_, wall)| wall)))
     }
 
     /// Least and greatest thickness [m] on a moved mesh.
@@ -183,6 +173,16 @@ impl WallThickness {
             .map(|(_, wall)| wall.thickness)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
     }
+}
+
+/// The least thickness [m] of walls with the same key.
+fn least_of<K: Ord>(walls: impl Iterator<Item = (K, Wall)>) -> BTreeMap<K, f64> {
+    let mut least = BTreeMap::new();
+    for (key, wall) in walls {
+        let own = least.entry(key).or_insert(f64::INFINITY);
+        *own = wall.thickness.min(*own);
+    }
+    least
 }
 
 /// The wall between a design node and what lies opposite.

@@ -177,8 +177,8 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
 /// `e^(−2jφ)` of the phase `φ`, but for signs, that everything which excites the field has; `None` of several. Of a voltage it is that
 /// of the current that it drives, where there is no other coil, of which a change would change that of the first.
 fn phase_of_sources(model: &FieldModel, solution: &FieldSolution) -> Option<c64> {
-    let driven = model.setup().windings.iter().flatten().any(|winding| winding.voltage.is_some());
-    if driven && model.coils().len() > 1 {
+    let is_driven = model.setup().windings.iter().flatten().any(|winding| winding.voltage.is_some());
+    if is_driven && model.coils().len() > 1 {
         return None;
     }
     let given = model.coils().iter().map(|coil| coil.ampere_turns);

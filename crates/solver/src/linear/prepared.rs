@@ -184,7 +184,10 @@ impl PreparedSystem {
     }
 
     /// As [`PreparedSystem::solve`], with the currents that voltages drive behind the field's unknowns.
-    fn solve_all(&mut self, right_side: &[c64]) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+    pub(crate) fn solve_all(
+        &mut self,
+        right_side: &[c64],
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
         let (field, circuits) = right_side.split_at(self.field_unknowns(right_side)[1].min(right_side.len()));
         let (mut values, report, currents) = self.solve_with(field, Excitation::Given(circuits))?;
         values.extend(currents);

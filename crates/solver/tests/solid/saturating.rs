@@ -4,16 +4,14 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::tet4::Point;
 use fluxmorph_solver::circuit::terminals;
 use fluxmorph_solver::functional::AtTerminals;
-use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::{
     BhCurve, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, Order, Winding,
-    adjoint,
 };
 
-use super::{bar_in_a_box, setup_with_a_bar, sway};
+use super::{bar_in_a_box, derivatives_match, setup_with_a_bar};
+use crate::saturation::{law, straight};
 use crate::{ALL, NO_CIRCUIT};
 
 /// Hz.
@@ -26,15 +24,6 @@ const SERIES: [Winding; 2] = [
     Winding { resistance: 1e-5, series_inductance: 1e-8, ..NO_CIRCUIT },
     Winding { turns: 20.0, resistance: 0.05, ..NO_CIRCUIT },
 ];
-
-/// Saturates at 1.8 T.
-fn curve() -> BhCurve {
-    let point = |i: i32| {
-        let h = 20.0 * (1.3_f64.powi(i) - 1.0);
-        [h, VACUUM_PERMEABILITY * h + 1.8 * (1.0 - (-h / 700.0).exp())]
-    };
-    BhCurve::new(&(0..32).map(point).collect::<Vec<_>>()).expect("a sound table")
-}
 
 /// The bar and the winding with their currents [A], or with these voltages [V], beside the plate of iron.
 fn setup(
@@ -68,8 +57,7 @@ fn voltages(model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> [c64; 2] 
 #[test]
 fn a_straight_table_beside_circuits_is_the_linear_material() {
     let mesh = bar_in_a_box();
-    let straight =
-        BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * IRON.reluctivity(), b])).expect("a sound table");
+    let straight = straight(IRON);
     let sources = [
         ([CURRENTS[0] * 1e-4, CURRENTS[1] * 1e-4], [None; 2]),
         ([c64::default(); 2], [Some(c64::new(1e-3, 2e-3)), Some(c64::new(0.02, 0.0))]),
@@ -94,12 +82,11 @@ fn a_straight_table_beside_circuits_is_the_linear_material() {
 #[test]
 fn what_is_short_circuited_beside_a_curve_has_a_state() {
     let mesh = bar_in_a_box();
-    let straight =
-        BhCurve::new(&[0.3, 1.0, 9.0].map(|b| [b * IRON.reluctivity(), b])).expect("a sound table");
+    let straight = straight(IRON);
     for (shorted, share) in [(0, 1e-4), (1, 1e-4), (0, 1.0), (1, 1.0)] {
         let mut currents = CURRENTS.map(|current| share * current);
         currents[shorted] = c64::default();
-        let law = if share < 1.0 { straight.clone() } else { curve() };
+        let law = if share < 1.0 { straight.clone() } else { law() };
         let seen = [None, Some(law)].map(|curve| {
             let mut setup = setup(&mesh, ALL[2], (IRON, curve), (currents, [None; 2]));
             let turns = SERIES[shorted].turns;
@@ -121,7 +108,7 @@ fn voltages_drive_the_currents_that_need_them_beside_saturated_iron() {
     let topology = mesh.topology();
     let plate = topology.elements_of(topology.region("plate").expect("a region"));
     for elements in ALL {
-        let of = |sources| crate::solved(&mesh, setup(&mesh, elements, (IRON, Some(curve())), sources));
+        let of = |sources| crate::solved(&mesh, setup(&mesh, elements, (IRON, Some(law())), sources));
         let (given, state) = of((CURRENTS, [None; 2]));
         let most = |b: &[c64; 3]| b.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt();
         let densities = state.flux_densities_of(&given, &mesh, &plate);
@@ -152,9 +139,8 @@ fn voltages_drive_the_currents_that_need_them_beside_saturated_iron() {
 #[test]
 fn derivatives_of_what_voltages_drive_beside_saturated_iron_match_differences() {
     let mesh = bar_in_a_box();
-    let (moving, direction) = sway(&mesh);
     for elements in [ALL[0], ALL[2]] {
-        let of = |sources| crate::solved(&mesh, setup(&mesh, elements, (IRON, Some(curve())), sources));
+        let of = |sources| crate::solved(&mesh, setup(&mesh, elements, (IRON, Some(law())), sources));
         let (given, state) = of((CURRENTS, [None; 2]));
         let needed = voltages(&given, &mesh, &state);
         for sources in [(CURRENTS, [None; 2]), ([c64::default(); 2], needed.map(Some))] {
@@ -173,35 +159,7 @@ fn derivatives_of_what_voltages_drive_beside_saturated_iron_match_differences() 
                     Functional::at_terminals(&model, "winding", AtTerminals::Current).expect("a winding"),
                 );
             }
-            let solve = |step: f64| {
-                let moved: Vec<Point> = direction.iter().map(|v| v.map(|c| step * c)).collect();
-                let mesh = mesh.moved(&moved).expect("small");
-                let (state, system) = model.solve(&mesh).expect("a field");
-                (mesh, state, system)
-            };
-            let step = 1e-6;
-            let (at, state, mut system) = solve(0.0);
-            let sides = [solve(step), solve(-step)];
-            for functional in functionals {
-                let value = functional.evaluate(&model, &at, &state).expect("finite");
-                let lambda = adjoint::solve(&mut system, &value.derivative).expect("an adjoint");
-                let mut gradient =
-                    adjoint::node_gradient(&model, &at, &state, &lambda, &moving).expect("one process");
-                let explicit = value.explicit.unwrap_or_default();
-                gradient
-                    .iter_mut()
-                    .zip(explicit)
-                    .for_each(|(sum, own)| (0..3).for_each(|d| sum[d] += own[d]));
-                let terms = gradient.iter().zip(&direction);
-                let exact: f64 = terms.map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum();
-                let [plus, minus] = sides
-                    .each_ref()
-                    .map(|(mesh, state, _)| functional.evaluate(&model, mesh, state).expect("finite").value);
-                let difference = (plus - minus) / (2.0 * step);
-                println!("{elements:?} {is_driven}: {exact:e} {:e}", difference / exact - 1.0);
-                // As where all is linear: truncation, and rounding of the solver over the step.
-                assert!((difference / exact - 1.0).abs() < 1e-6, "{elements:?}: {difference} {exact}");
-            }
+            derivatives_match(&model, &mesh, &functionals);
         }
     }
 }
