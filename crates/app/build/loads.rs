@@ -76,16 +76,16 @@ fn drive_fault(
         let help = format!("add a line like: turns = 10 to coils[{index}]");
         return Some(source.diagnostic(&path, message).help(help));
     }
-    let message = if config.boundaries.uniform_field.is_some() {
-        "the voltage that an applied field induces is not known to the circuit"
+    let (message, expected) = if config.boundaries.uniform_field.is_some() {
+        ("the voltage that an applied field induces is not known to the circuit", "coils alone as sources")
     } else if is_static && coil.resistance.unwrap_or(0.0) == 0.0 && !coil.is_solid() {
-        "at 0 Hz no resistance limits the current"
+        ("at 0 Hz no resistance limits the current", "a resistance in series")
     } else if is_static && coil.series_capacitance.is_some() {
-        "at 0 Hz a capacitance passes no current"
+        ("at 0 Hz a capacitance passes no current", "no capacitance in series, or a given current of 0 A")
     } else {
         return None;
     };
-    Some(source.diagnostic(&path, message).expected("a resistance in series, and coils alone as sources"))
+    Some(source.diagnostic(&path, message).expected(expected))
 }
 
 /// What to say of bounds on the sum over several states of what does not add up.

@@ -323,12 +323,17 @@ fn optimisation_warnings(config: &Config, constraints: &[Constraint], mode: Mode
                 .to_owned(),
         );
     }
-    if config.accuracy.tolerance.is_some()
-        && config.analysis.order == ElementOrder::Quadratic
-        && mode != Mode::Analysis
-    {
-        warnings
-            .push("accuracy.tolerance needs analysis.order = 1: the mesh of a run is not refined".to_owned());
+    if config.accuracy.tolerance.is_some() && mode != Mode::Analysis {
+        let alternates = || config.load_cases().iter().any(|case| case.frequency > 0.0);
+        let needed = if config.analysis.order == ElementOrder::Quadratic {
+            Some("analysis.order = 1")
+        } else if config.saturating_region().is_some() && alternates() {
+            Some("an estimated error, and beside a B–H curve there is none above 0 Hz")
+        } else {
+            None
+        };
+        let text = |needed| format!("accuracy.tolerance needs {needed}: the mesh of a run is not refined");
+        warnings.extend(needed.map(text));
     }
     warnings
 }

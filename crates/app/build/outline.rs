@@ -158,7 +158,7 @@ mod tests {
             let plate = outline.full_mesh.topology().region("plate").expect("a plate");
             assert_eq!(design.bodies, [plate]);
             let thickness = design.thickness.as_ref().expect("a plate has one");
-            let (low, high) = thickness.range(&design.surface, &outline.full_mesh);
+            let (low, high) = thickness.range(&outline.full_mesh);
             assert!((low - 0.01).abs() < 1e-12 && (high - 0.01).abs() < 1e-12, "{low} {high}");
         }
     }

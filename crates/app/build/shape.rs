@@ -76,7 +76,6 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
     warnings.extend(held_warning(inputs.remesh, mesh, &surface));
     warnings.extend(slid_warning(inputs.remesh, design));
-    warnings.extend(opposite_warning(inputs.remesh, mesh, &surface));
     let guidance = guidance(source, Some(design), inputs.remesh)?;
     let law = motion_law(source, inputs.remesh, common_axis(surface.directions()), Mover::Design)?;
     warnings.extend(unused_keys(source, inputs.remesh, law));
@@ -84,6 +83,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
     warnings.extend(torn_warning(inputs.remesh, mesh, &setup.subregions));
     let setup = RemeshSetup { ownership: inputs.share.cloned(), ..setup };
     let motion = Motion::new(mesh.clone(), setup)?;
+    warnings.extend(opposite_warning(inputs.remesh, mesh, &surface, motion.map()));
     Ok(Body { full_surface, surface, motion })
 }
 
@@ -204,7 +204,7 @@ fn slid_warning(remesh: &Remesh, design: &Design) -> Vec<String> {
 
 /// Faces in `remesh.free` that lie across the motion of the design and are not named to stay, such as the far side of a plate: they
 /// follow it, so that its thickness is not what the variables say.
-fn opposite_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Vec<String> {
+fn opposite_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface, map: &ElasticMap) -> Vec<String> {
     let directions = surface.directions().iter().filter(|d| norm(**d) > 0.0);
     let Some(along) = directions.clone().next() else { return Vec::new() };
     let is_along = |d: &Point| dot(*d, *along).abs() > ALIKE * norm(*d) * norm(*along);
@@ -218,7 +218,8 @@ fn opposite_warning(remesh: &Remesh, mesh: &Mesh, surface: &DesignSurface) -> Ve
     let of = |free: &String| {
         let across = |face: &&[NodeId; 3]| {
             let normal = area_vector(face.map(|n| mesh.point(n)));
-            let moves = !face.iter().any(is_designed) && !stays.contains(&face_key(**face));
+            let is_free = face.iter().any(|n| map.is_unknown(*n));
+            let moves = is_free && !face.iter().any(is_designed) && !stays.contains(&face_key(**face));
             moves && dot(normal, *along).abs() > ACROSS * norm(normal) * norm(*along)
         };
         let face = mesh.topology().surface(free).ok()?.iter().find(across)?;
@@ -333,9 +334,9 @@ fn vanishing_faults(
             Ok(i) => add(mesh.point(node), displacement[i]),
             Err(_) => mesh.point(node),
         };
-        let left = thickness.walls(surface, moved).map(|(_, wall)| wall.thickness);
+        let left = thickness.walls(moved).map(|(_, wall)| wall.thickness);
         // Of the bound, the share that takes all of the wall: the least one is what is left to go to.
-        let spent = left.zip(thickness.at_nodes()).filter(|(left, _)| *left <= 0.0);
+        let spent = left.zip(thickness.initial()).filter(|(left, _)| *left <= 0.0);
         let share = spent.map(|(left, (i, thickness))| (thickness / (thickness - left), i, thickness));
         let Some((share, i, thickness)) = share.min_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
         let message = format!(

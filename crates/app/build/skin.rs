@@ -253,7 +253,7 @@ pub(crate) fn least_thickness(
 ) -> LeastThickness {
     let Some(thickness) = shape.thickness() else { return BTreeMap::new() };
     let name = |region: RegionId| full_mesh.topology().region_names()[region.index()].clone();
-    let least = thickness.least_of_bodies(shape.surface(), place);
+    let least = thickness.least_of_bodies(place);
     least.into_iter().map(|(region, least)| (name(region), least)).collect()
 }
 

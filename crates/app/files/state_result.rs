@@ -108,8 +108,8 @@ pub struct CoilResult {
     pub current_a: Amplitude,
     /// Flux linkage [Wb].
     pub flux_linkage_wb: Amplitude,
-    /// Resistance of the wire, and of the losses that its current alone makes [Ω].
-    pub resistance_ohm: f64,
+    /// Resistance of the wire, and of the losses that its current alone makes [Ω]; `null` where it is not known.
+    pub resistance_ohm: Option<f64>,
     /// Voltage across it [V].
     pub voltage_v: Amplitude,
 }

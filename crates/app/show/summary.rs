@@ -110,8 +110,9 @@ pub(super) fn lines(result: &RunResult, named: &Named, styles: &Styles) -> Vec<S
         let text = |set| expansion_text(set, state.errors) + at;
         rows.extend(state.multipoles.iter().map(|set| ("expansion", text(set))));
     }
-    if let Some([share, ..]) = result.open.as_ref().map(|open| open.energy_share.as_slice()) {
-        rows.push(("energy in open space", format!("{:.2} %", 100.0 * share)));
+    let shares = result.open.iter().flat_map(|open| &open.energy_share);
+    for ((at, _), share) in states.iter().zip(shares) {
+        rows.push(("energy in open space", format!("{:.2} %{at}", 100.0 * share)));
     }
     let (last, first) = (result.mesh.worst_quality_final, result.mesh.worst_quality_initial);
     if is_run {
@@ -268,13 +269,14 @@ fn coil_text(coil: &CoilResult, errors: Option<&StateErrors>) -> String {
         Amplitude::Phasor([re, im]) => format!("({re:.6e} {im:+.6e}j)"),
     };
     format!(
-        "{}: {} A{}, {} Wb{}, {:.6e} ohm{}, {} V",
+        "{}: {} A{}, {} Wb{}, {}{}, {} V",
         printable(&coil.name),
         text(coil.current_a),
         bar(errors.and_then(|errors| errors.currents_a.get(&coil.name)), "A"),
         text(coil.flux_linkage_wb),
         bar(errors.and_then(|errors| errors.flux_linkages_wb.get(&coil.name)), "Wb"),
-        coil.resistance_ohm,
+        coil.resistance_ohm
+            .map_or_else(|| "no resistance at rest".to_owned(), |own| format!("{own:.6e} ohm")),
         bar(errors.and_then(|errors| errors.resistances_ohm.get(&coil.name)), "ohm"),
         text(coil.voltage_v)
     )

@@ -109,6 +109,7 @@ const V4_DAMAGE: &[Damage] = &[
 
 const V2_DAMAGE: &[Damage] = &[
     ("2.2 0 8", "2.3 0 8", 2, "section $MeshFormat", "version 2.3"),
+    ("$Nodes\n", "$ParametricNodes\n", 10, "section $ParametricNodes", "Mesh.SaveParametric = 0"),
     ("$Nodes\n5", "$Nodes\n6", 17, "section $Nodes", "found `$EndNodes`"),
     ("$Nodes\n5", "$Nodes\n4", 16, "section $Nodes", "expected the end of the section"),
     ("$Nodes\n5", "$Nodes\n5000", 11, "section $Nodes", "5000 nodes"),

@@ -269,7 +269,9 @@ pub enum NonConvergence {
 #[non_exhaustive]
 pub enum NewtonFailure {
     /// The law or the load keep it far off.
-    #[error("check the units of its B–H table and the currents")]
+    #[error(
+        "check the units of its B–H table and the currents; a capacitance in series with it may have several states, or one that is hard to find"
+    )]
     Law,
     /// It is nearly there and does not come nearer, with the most robust linear method that there is memory for.
     #[error("the mesh may hold nearly flat elements; more memory for a factor may help")]

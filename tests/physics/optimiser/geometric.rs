@@ -58,7 +58,7 @@ fn evaluate(setup: &Setup, bound: &ThicknessBound, p: &[f64]) -> (f64, Vec<f64>)
 fn range(setup: &Setup, p: &[f64]) -> (f64, f64) {
     let shape = setup.problem.shape().expect("a shape");
     let mesh = setup.problem.moved(p).expect("inside the bounds").mesh;
-    shape.thickness().expect("a plate has one").range(shape.surface(), &mesh)
+    shape.thickness().expect("a plate has one").range(&mesh)
 }
 
 #[test]

@@ -6,7 +6,8 @@ use super::super::entries::{density, material};
 use super::super::multipole;
 use super::super::references::functionals;
 use crate::config::{
-    self, ABOVE_ZERO_HERTZ, CoilShape, Config, Diagnostic, LoadCase, ObjectiveKind, RegionModel, SourceMap,
+    self, ABOVE_ZERO_HERTZ, Coil, CoilShape, Config, Diagnostic, LoadCase, ObjectiveKind, RegionModel,
+    SourceMap,
 };
 
 /// What objective and constraints ask of regions that these cannot give.
@@ -142,23 +143,9 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
                 let message = format!("the coil `{name}` has no turns, so there is no {kind} of it");
                 let help = format!("add a line like: turns = 10 to coils[{index}]");
                 faults.push(source.diagnostic(&path, message).help(help));
-            } else if functional.kind == ObjectiveKind::Current
-                && let Some(case) = given.iter().find(|case| !case.feed(coil).by_voltage)
-            {
-                let message =
-                    format!("the current of the coil `{name}` is given{}: no shape changes it", case.words());
-                faults.push(source.diagnostic(&path, message).expected("a coil that a voltage drives"));
-            } else if functional.kind == ObjectiveKind::PowerFactor
-                && let Some(case) = given.iter().find(|case| case.feed(coil).amplitude == 0.0)
-            {
-                let state = if case.feed(coil).by_voltage { "short-circuited" } else { "open" };
-                let message = format!(
-                    "the coil `{name}` is {state}{}: no power comes in, of which a part could be real",
-                    case.words()
-                );
-                let fault = source.diagnostic(&path, message);
-                faults.push(
-                    fault.expected("a coil with a current or a voltage; `load` chooses one of several loads"),
+            } else {
+                faults.extend(
+                    given.iter().find_map(|case| unchanging(functional.kind, coil, case, (source, &path))),
                 );
             }
         }
@@ -172,4 +159,34 @@ fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
         }
     }
     faults
+}
+
+/// What no shape changes under a load, of a coil at this path.
+fn unchanging(
+    kind: ObjectiveKind,
+    coil: &Coil,
+    case: &LoadCase<'_>,
+    (source, path): (&SourceMap, &str),
+) -> Option<Diagnostic> {
+    let (feed, name, words) = (case.feed(coil), &coil.name, case.words());
+    let is_bare = coil.series_inductance.is_none() && coil.series_capacitance.is_none();
+    let (message, expected) = match kind {
+        ObjectiveKind::Current if !feed.by_voltage => (
+            format!("the current of the coil `{name}` is given{words}: no shape changes it"),
+            "a coil that a voltage drives",
+        ),
+        ObjectiveKind::Voltage if feed.by_voltage && is_bare => (
+            format!("the voltage of the coil `{name}` is given{words}: no shape changes it"),
+            "a coil with a current, or one that a voltage drives through a reactance in series",
+        ),
+        ObjectiveKind::Power | ObjectiveKind::PowerFactor if feed.amplitude == 0.0 => {
+            let state = if feed.by_voltage { "short-circuited" } else { "open" };
+            (
+                format!("the coil `{name}` is {state}{words}: no power comes in"),
+                "a coil with a current or a voltage; `load` chooses one of several loads",
+            )
+        }
+        _ => return None,
+    };
+    Some(source.diagnostic(path, message).expected(expected))
 }

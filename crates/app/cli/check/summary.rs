@@ -282,7 +282,7 @@ impl ConstrainedShape {
         let moved = problem.moved(shape.initial()).map_err(OptimizerError::from)?;
         for own in constraints {
             if let Quantity::Thickness { .. } = own.quantity {
-                let range = |thickness: &WallThickness| thickness.range(shape.surface(), &moved.mesh).into();
+                let range = |thickness: &WallThickness| thickness.range(&moved.mesh).into();
                 found.constrained_thickness_m = shape.thickness().map(range);
             } else if let Some((value, _)) = own.of_shape(&moved, shape).map_err(OptimizerError::from)? {
                 found.constrained_bodies.insert(own.name.clone(), value);

@@ -1,5 +1,6 @@
 //! `[[constraints]]`: what must stay below a bound while the objective is optimised.
 
+use fluxmorph_optimizer::geometric::kept_back;
 use fluxmorph_solver::frequency_label;
 use serde::Serialize;
 use serde_json::json;
@@ -326,11 +327,15 @@ impl Limit {
             section.missing(&THICKNESSES, "minimum = \"6 mm\", or maximum = \"25 mm\"");
         }
         if let (Some(minimum), Some(maximum)) = (minimum, maximum)
-            && minimum >= maximum
+            && minimum + kept_back(minimum) >= maximum - kept_back(maximum)
         {
             let message =
                 format!("`{}` asks for {minimum} m at least and {maximum} m at most", section.path());
-            section.clash(THICKNESSES, message, "more than the minimum");
+            section.clash(
+                THICKNESSES,
+                message,
+                "a maximum of 1.021 times the minimum or more: both are held on the safe side",
+            );
         }
         Self::Thickness { kind: ThicknessKind::Thickness, minimum, maximum }
     }

@@ -376,8 +376,8 @@ impl Functional {
             && kind.coils() > 0
             && named.len() != kind.coils()
         {
-            let message =
-                format!("`{}` is of {} coils, and {} are named", kind.name(), kind.coils(), named.len());
+            let of = ["", "one coil", "two coils"][kind.coils()];
+            let message = format!("`{}` is of {of}, and {} named", kind.name(), named.len());
             section.wrong("coils", message, example);
         }
         if let Some(named) = self.harmonics.as_ref().filter(|_| kind == ObjectiveKind::Multipole)

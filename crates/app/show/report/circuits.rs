@@ -30,7 +30,8 @@ fn terminals(state: &State<'_>) -> Markup {
             format!("{}{of_current}", amplitude(coil.current_a, "A")),
             amplitude(coil.flux_linkage_wb, "Wb"),
             bar(errors.and_then(|errors| errors.flux_linkages_wb.get(&coil.name)), 1.0),
-            format!("{} Ω{of_resistance}", number(coil.resistance_ohm, 5)),
+            coil.resistance_ohm
+                .map_or_else(String::new, |own| format!("{} Ω{of_resistance}", number(own, 5))),
             amplitude(coil.voltage_v, "V"),
         ]
     };

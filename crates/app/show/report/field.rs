@@ -89,7 +89,7 @@ fn caption(
     let cases = data.config.load_cases();
     let mut text = format!("Magnitude of the flux density in {}", window.describe("mm"));
     if cases.iter().any(|case| case.frequency != 0.0) {
-        text += " (peak value)";
+        text += " (√(B·B*): the peak value where B does not turn)";
     }
     if let [first, _, ..] = cases.as_slice() {
         text += &match first.name() {

@@ -65,12 +65,12 @@ impl SurfaceValues {
         let free = data.config.remesh.iter().flat_map(|remesh| &remesh.free);
         let free = free.filter_map(|name| outline.full_mesh.topology().surface(name).ok());
         let free: BTreeSet<NodeId> = free.flatten().flatten().copied().collect();
-        let may_move = thickness.opposite_faces().flatten().any(|node| free.contains(&node));
+        let may_move = thickness.opposite_nodes().any(|node| free.contains(&node));
         let values = [Moment::Before, Moment::After].map(|moment| {
             let place = place(data, outline, design, moment)
                 .filter(|_| !may_move || data.fields[moment as usize].is_ok())?;
             let mut all = vec![None; design.surface.nodes().len()];
-            let least = thickness.least_at_nodes(&design.surface, place);
+            let least = thickness.least_at_nodes(place);
             least.into_iter().for_each(|(i, thickness)| all[i] = Some(1e3 * thickness));
             Some(all)
         });

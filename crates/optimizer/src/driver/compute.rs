@@ -212,7 +212,7 @@ impl Run<'_> {
     /// The record of a design, but for how it compares with the best.
     fn record(&self, p: &[f64], initial: &Initial, analysis: &Analysis) -> Record {
         let shape = self.shape();
-        let range = |thickness: &WallThickness| thickness.range(shape.surface(), &analysis.mesh);
+        let range = |thickness: &WallThickness| thickness.range(&analysis.mesh);
         let thickness = shape.thickness().map(range);
         let difference: Vec<f64> = p.iter().zip(&self.last).map(|(p, last)| p - last).collect();
         let objective = analysis.objective.expect("an optimisation has an objective");

@@ -6,7 +6,7 @@
 mod thickness_bound;
 mod wall_thickness;
 
-pub use thickness_bound::{MARGIN, ThicknessBound, ThicknessLimit};
+pub use thickness_bound::{MARGIN, ThicknessBound, ThicknessLimit, kept_back};
 pub use wall_thickness::{Wall, WallThickness, faces_with_bodies};
 
 /// The design has no thickness.

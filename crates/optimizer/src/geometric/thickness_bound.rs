@@ -76,7 +76,8 @@ impl ThicknessBound {
         let thickness = shape.thickness().ok_or(NoThickness)?;
         let (ThicknessLimit::Minimum(limit) | ThicknessLimit::Maximum(limit)) = bound;
         // Two at least, as ln 1 = 0.
-        let count = thickness.at_nodes().count().max(2) as f64;
+        let counted = thickness.walls(|_| [0.0; 3]).filter(|(_, wall)| counts(bound, wall));
+        let count = counted.count().max(2) as f64;
         Ok(Self { bound, sharpness: count.ln() / given_away(limit), linear: None })
     }
 
@@ -133,10 +134,11 @@ impl ThicknessBound {
         let (thickness, surface) = (shape.thickness()?, shape.surface());
         let map = shape.motion().map();
         let mut limits = Vec::new();
-        for ((_, initial), (_, wall)) in thickness.at_nodes().zip(thickness.walls(surface, |_| [0.0; 3])) {
+        let walls = thickness.initial().zip(thickness.walls(|_| [0.0; 3]));
+        for ((_, initial), (_, wall)) in walls.filter(|(_, (_, wall))| counts(self.bound, wall)) {
             let (sign, room) = match self.bound {
-                ThicknessLimit::Minimum(limit) => (1.0, initial - limit - SAFETY * given_away(limit)),
-                ThicknessLimit::Maximum(limit) => (-1.0, limit - SAFETY * given_away(limit) - initial),
+                ThicknessLimit::Minimum(limit) => (1.0, initial - limit - kept_back(limit)),
+                ThicknessLimit::Maximum(limit) => (-1.0, limit - kept_back(limit) - initial),
             };
             let mut slopes: BTreeMap<usize, f64> = BTreeMap::new();
             for (node, derivative) in wall.derivatives {
@@ -180,7 +182,8 @@ impl ThicknessBound {
         };
         let mesh = &moved.mesh;
         let excess: Vec<(Wall, f64)> = thickness
-            .walls(shape.surface(), |n| mesh.point(n))
+            .walls(|n| mesh.point(n))
+            .filter(|(_, wall)| counts(self.bound, wall))
             .map(|(_, wall)| (wall, sign * (wall.thickness - limit)))
             .collect();
         let greatest = excess.iter().fold(f64::NEG_INFINITY, |most, &(_, g)| most.max(g));
@@ -209,8 +212,22 @@ fn given_away(limit: f64) -> f64 {
     MARGIN * if limit == 0.0 { 1e-6 } else { limit.abs() }
 }
 
+/// By how much a limit is held on the safe side where it is shown to a method as bounds or linear limits [m].
+pub fn kept_back(limit: f64) -> f64 {
+    SAFETY * given_away(limit)
+}
+
+/// Whether a wall has a say in a limit: behind design nodes all, before nodes opposite those that are beyond what the others say by
+/// more than these are held on the safe side.
+fn counts(bound: ThicknessLimit, wall: &Wall) -> bool {
+    wall.bulge.is_none_or(|bulge| match bound {
+        ThicknessLimit::Minimum(limit) => bulge > given_away(limit),
+        ThicknessLimit::Maximum(limit) => -bulge > given_away(limit),
+    })
+}
+
 /// Whether a node opposite is a design node, or one that the elastic map decides.
 fn opposite_moves(shape: &Shape, thickness: &WallThickness) -> bool {
     let (map, designed) = (shape.motion().map(), shape.surface().nodes());
-    thickness.opposite_faces().flatten().any(|n| designed.binary_search(&n).is_ok() || map.is_unknown(n))
+    thickness.opposite_nodes().any(|n| designed.binary_search(&n).is_ok() || map.is_unknown(n))
 }

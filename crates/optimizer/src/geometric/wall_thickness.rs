@@ -1,4 +1,5 @@
-//! Wall thickness of the designed bodies behind every design node, measured along the node's direction of motion.
+//! Wall thickness of the designed bodies, measured along the direction of motion behind every design node, and before every node of
+//! the faces opposite where these are no planes.
 //!
 //! From each node `x` of the design surface a ray runs against its direction `d` to where it leaves the body. On the
 //! undeformed mesh it meets a triangle there with corners `y_k`, at the weights `b_k`, and with the normal `n`. On a moved mesh the
@@ -9,12 +10,17 @@
 //!
 //! the initial one plus the node's height where that face is held. The normal on the moved mesh, which at a re-entrant edge may turn
 //! by a right angle, has no say in it. A node without direction has no thickness.
+//!
+//! Between two design nodes the body may be thinner than behind both: before a step, a rib or a kink of the face opposite. So a ray runs
+//! from every node of that face as well, along `d`, to the triangle of the design surface that it leaves the body through; the roles of
+//! node and triangle are exchanged, and the formulas are the same with `d` turned around. What the thicknesses behind the corners of that
+//! triangle say already is not written down again. Where two edges cross nothing is measured.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::ray::{Hit, hit, reach};
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
+use fluxmorph_geometry::tet4::{Point, add, area_vector, dot, norm};
 use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
@@ -24,44 +30,56 @@ use crate::design::DesignSurface;
 /// round side lean by less, and an opposite face as steep as that makes no body whose thickness means anything.
 const GRAZING: f64 = 0.1;
 
-/// What lies opposite of a design node on the undeformed mesh.
+/// Share of a distance by which it may differ from what those around it say by rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// Most steps from the direction at one design node to that where a ray from opposite leaves the body.
+const MOST_TURNS: usize = 5;
+
+/// What lies opposite of a node on the undeformed mesh.
 #[derive(Clone, Copy, Debug)]
 struct Opposite {
     /// Distance [m].
     distance: f64,
+    /// The node.
+    node: NodeId,
     /// The triangle there.
     nodes: [NodeId; 3],
     /// The weights of its nodes.
     weights: Point,
-    /// `n / (n·d)`: what the thickness grows by with the place of the design node.
+    /// `n / (n·d)`: what the thickness grows by with the place of the node.
     growth: Point,
     /// The region between, of the mesh that was measured.
     body: RegionId,
+    /// By how much the body is thinner here than the design nodes around say [m]; `None` of these nodes themselves.
+    bulge: Option<f64>,
 }
 
 impl Opposite {
-    /// Where the ray against a direction leaves a body through a triangle.
-    fn new(hit: &Hit, direction: Point, (nodes, body): ([NodeId; 3], RegionId)) -> Self {
+    /// Where a ray from a node leaves a body through a triangle, `outwards` being against the ray.
+    fn new(node: NodeId, hit: &Hit, outwards: Point, (nodes, body): ([NodeId; 3], RegionId)) -> Self {
         let &Hit { distance, weights, normal } = hit;
-        let growth = normal.map(|c| c / dot(normal, direction));
-        Self { distance, nodes, weights, growth, body }
+        let growth = normal.map(|c| c / dot(normal, outwards));
+        Self { distance, node, nodes, weights, growth, body, bulge: None }
     }
 }
 
-/// The wall behind one design node.
+/// One wall between a node and the triangle opposite.
 #[derive(Clone, Copy, Debug)]
 pub struct Wall {
     /// Its thickness [m].
     pub thickness: f64,
-    /// Derivatives with respect to the positions of the design node and of the three nodes opposite.
+    /// Derivatives with respect to the positions of the node and of the three nodes opposite.
     pub derivatives: [(NodeId, Point); 4],
+    /// By how much the body was thinner here than the design nodes around say, on the undeformed mesh [m]; `None` behind a design node.
+    pub bulge: Option<f64>,
 }
 
-/// The opposite faces behind every design node: one in each body that the node is a part of.
+/// What lies opposite of every design node, in each body that the node is a part of, and of nodes opposite where that says more.
 #[derive(Clone, Debug)]
 pub struct WallThickness {
-    /// With the node's place in the design surface, ascending; none where the node has no direction, or its ray leads past the body or
-    /// through its side at a rim.
+    /// With the place in the design surface of the node, or of the nearest one, ascending; none where the node has no direction, or its
+    /// ray leads past the body or through its side at a rim.
     opposite: Vec<(usize, Opposite)>,
 }
 
@@ -91,7 +109,7 @@ impl WallThickness {
                 // Along the facets of a side that is round a ray from the rim meets one of them anywhere.
                 let grazing = || faces.grazed(origin, back).filter(|_| !faces.are_at_rim(node));
                 let (hit, nodes) = faces.opposite(origin, back).or_else(grazing)?;
-                Some(Opposite::new(&hit, *direction, (nodes, body)))
+                Some(Opposite::new(node, &hit, *direction, (nodes, body)))
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
             let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
@@ -106,51 +124,57 @@ impl WallThickness {
         let nodes = surface.nodes().iter().zip(surface.directions());
         let by_node = nodes.map(opposite_of).collect::<Option<Vec<_>>>()?;
         let with_place = |(i, found): (usize, Vec<Opposite>)| found.into_iter().map(move |own| (i, own));
-        let opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(with_place).collect();
+        let mut opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(with_place).collect();
+        let facing: Vec<_> = of.iter().flat_map(|(_, own)| own.facing(mesh, surface, &opposite)).collect();
+        opposite.extend(facing);
+        opposite.sort_by_key(|&(place, _)| place);
         (!opposite.is_empty()).then_some(Self { opposite })
     }
 
     /// The same on a mesh in which every node has another number; `None` where it lacks one of them.
     pub fn renumbered(&self, new_of: &[Option<NodeId>]) -> Option<Self> {
         let renumber = |(place, own): &(usize, Opposite)| {
-            let [a, b, c] = own.nodes.map(|n| new_of[n.index()]);
-            Some((*place, Opposite { nodes: [a?, b?, c?], ..*own }))
+            let [node, a, b, c] =
+                [own.node, own.nodes[0], own.nodes[1], own.nodes[2]].map(|n| new_of[n.index()]);
+            Some((*place, Opposite { node: node?, nodes: [a?, b?, c?], ..*own }))
         };
         Some(Self { opposite: self.opposite.iter().map(renumber).collect::<Option<_>>()? })
     }
 
-    /// Initial thickness [m] behind every design node, in each of its bodies, with the node's place in the design surface.
-    pub fn at_nodes(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
+    /// Initial thickness [m] of every wall, with the place in the design surface of its node or of the nearest one.
+    pub fn initial(&self) -> impl Iterator<Item = (usize, f64)> + '_ {
         self.opposite.iter().map(|(i, opposite)| (*i, opposite.distance))
     }
 
     /// The triangles opposite of all design nodes.
     pub fn opposite_faces(&self) -> impl Iterator<Item = [NodeId; 3]> + '_ {
-        self.opposite.iter().map(|(_, opposite)| opposite.nodes)
+        self.opposite.iter().filter(|(_, own)| own.bulge.is_none()).map(|(_, own)| own.nodes)
     }
 
-    /// The walls behind all design nodes, with the node's place in the design surface, where every node of the mesh is at `place` [m].
+    /// The nodes opposite of the design surface, some of them several times.
+    pub fn opposite_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
+        let facing = self.opposite.iter().filter(|(_, own)| own.bulge.is_some()).map(|(_, own)| own.node);
+        self.opposite_faces().flatten().chain(facing)
+    }
+
+    /// All walls, with the place in the design surface of their node or of the nearest one, where every node of the mesh is at `place`
+    /// [m].
     pub fn walls<'a>(
         &'a self,
-        surface: &'a DesignSurface,
         place: impl Fn(NodeId) -> Point + 'a,
     ) -> impl Iterator<Item = (usize, Wall)> + 'a {
-        self.opposite.iter().map(move |(i, opposite)| (*i, wall(surface.nodes()[*i], opposite, &place)))
+        self.opposite.iter().map(move |(i, opposite)| (*i, wall(opposite, &place)))
     }
 
-    /// The least thickness [m] behind every design node by its place in the surface, where every node of the mesh is at `place` [m].
-    pub fn least_at_nodes(
-        &self,
-        surface: &DesignSurface,
-        place: impl Fn(NodeId) -> Point,
-    ) -> BTreeMap<usize, f64> {
-        least_of(self.walls(surface, place))
+    /// The least thickness [m] at every design node by its place in the surface, where every node of the mesh is at `place` [m].
+    pub fn least_at_nodes(&self, place: impl Fn(NodeId) -> Point) -> BTreeMap<usize, f64> {
+        least_of(self.walls(place))
     }
 
     /// The same at every node of a moved mesh, shape `(n_nodes,)`; zero where none is measured.
     pub fn over_nodes(&self, surface: &DesignSurface, mesh: &Mesh) -> Vec<f64> {
         let mut thickness = vec![0.0; mesh.points().len()];
-        for (i, least) in self.least_at_nodes(surface, |n| mesh.point(n)) {
+        for (i, least) in self.least_at_nodes(|n| mesh.point(n)) {
             thickness[surface.nodes()[i].index()] = least;
         }
         thickness
@@ -158,18 +182,14 @@ impl WallThickness {
 
     /// The least thickness [m] of every body where every node of the mesh is at `place` [m], by the regions of the mesh that was
     /// measured.
-    pub fn least_of_bodies(
-        &self,
-        surface: &DesignSurface,
-        place: impl Fn(NodeId) -> Point,
-    ) -> BTreeMap<RegionId, f64> {
+    pub fn least_of_bodies(&self, place: impl Fn(NodeId) -> Point) -> BTreeMap<RegionId, f64> {
         let bodies = self.opposite.iter().map(|(_, opposite)| opposite.body);
-        least_of(bodies.zip(self.walls(surface, place).map(|(_, wall)| wall)))
+        least_of(bodies.zip(self.walls(place).map(|(_, wall)| wall)))
     }
 
     /// Least and greatest thickness [m] on a moved mesh.
-    pub fn range(&self, surface: &DesignSurface, mesh: &Mesh) -> (f64, f64) {
-        self.walls(surface, |n| mesh.point(n))
+    pub fn range(&self, mesh: &Mesh) -> (f64, f64) {
+        self.walls(|n| mesh.point(n))
             .map(|(_, wall)| wall.thickness)
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), t| (low.min(t), high.max(t)))
     }
@@ -185,13 +205,14 @@ fn least_of<K: Ord>(walls: impl Iterator<Item = (K, Wall)>) -> BTreeMap<K, f64> 
     least
 }
 
-/// The wall between a design node and what lies opposite.
-fn wall(node: NodeId, opposite: &Opposite, place: &impl Fn(NodeId) -> Point) -> Wall {
-    let Opposite { nodes: [a, b, c], weights, growth, .. } = *opposite;
+/// The wall between a node and what lies opposite.
+fn wall(opposite: &Opposite, place: &impl Fn(NodeId) -> Point) -> Wall {
+    let Opposite { node, nodes: [a, b, c], weights, growth, bulge, .. } = *opposite;
     let terms = [(node, 1.0), (a, -weights[0]), (b, -weights[1]), (c, -weights[2])];
     Wall {
         thickness: terms.iter().map(|&(n, weight)| weight * dot(growth, place(n))).sum(),
         derivatives: terms.map(|(n, weight)| (n, growth.map(|c| weight * c))),
+        bulge,
     }
 }
 
@@ -216,10 +237,13 @@ pub fn faces_with_bodies(mesh: &Mesh, surface: &DesignSurface) -> Vec<([NodeId; 
 
 /// The faces of a body, found by rays.
 struct BodyFaces {
+    body: RegionId,
     /// Seen from outside.
     nodes: Vec<[NodeId; 3]>,
     corners: Vec<[Point; 3]>,
     tree: BoxTree,
+    /// The faces of every node.
+    at_node: HashMap<NodeId, Vec<usize>>,
     /// The nodes of those that are part of the design surface, and of the others.
     designed_nodes: HashSet<NodeId>,
     other_nodes: HashSet<NodeId>,
@@ -234,7 +258,62 @@ impl BodyFaces {
             [designed, others].map(|faces: Vec<&[NodeId; 3]>| faces.into_iter().flatten().copied().collect());
         let corners: Vec<[Point; 3]> = nodes.iter().map(|f| f.map(|n| mesh.point(n))).collect();
         let tree = BoxTree::new(corners.iter().map(reach).collect());
-        Self { nodes, corners, tree, designed_nodes, other_nodes }
+        let mut at_node: HashMap<NodeId, Vec<usize>> = HashMap::new();
+        for (i, face) in nodes.iter().enumerate() {
+            face.iter().for_each(|&n| at_node.entry(n).or_default().push(i));
+        }
+        Self { body: region, nodes, corners, at_node, tree, designed_nodes, other_nodes }
+    }
+
+    /// The body before every node of the faces that the design surface does not have, where that says more than what lies behind the
+    /// design nodes around, which is given.
+    fn facing(
+        &self,
+        mesh: &Mesh,
+        surface: &DesignSurface,
+        behind: &[(usize, Opposite)],
+    ) -> Vec<(usize, Opposite)> {
+        let own = behind.iter().filter(|(_, own)| own.body == self.body);
+        let distances: HashMap<NodeId, f64> = own.map(|(_, own)| (own.node, own.distance)).collect();
+        let place_of = |node: NodeId| surface.nodes().binary_search(&node).expect("it was measured from");
+        let mut measured: Vec<NodeId> = distances.keys().copied().collect();
+        measured.sort_unstable();
+        let tree = BoxTree::of_points(&measured.iter().map(|&n| mesh.point(n)).collect::<Vec<_>>());
+        let facing_one = |&node: &NodeId| {
+            let (first, _) = tree.nearest(mesh.point(node))?;
+            let mut along = surface.directions()[place_of(measured[first])];
+            let mut steps = 0;
+            let (met, nodes) = loop {
+                let (met, nodes) = self.through(node, mesh.point(node), along)?;
+                nodes.iter().all(|n| distances.contains_key(n)).then_some(())?;
+                let there = mean(&nodes.map(|n| surface.directions()[place_of(n)]), met.weights);
+                steps += 1;
+                if there == along || steps == MOST_TURNS {
+                    break (met, nodes);
+                }
+                along = there;
+            };
+            let said: f64 = nodes.iter().zip(met.weights).map(|(n, weight)| weight * distances[n]).sum();
+            let bulge = said - met.distance;
+            let heaviest = (0..3).max_by(|&a, &b| met.weights[a].total_cmp(&met.weights[b]))?;
+            let found = Opposite::new(node, &met, along.map(|c| -c), (nodes, self.body));
+            (bulge.abs() > ROUNDING * met.distance)
+                .then_some((place_of(nodes[heaviest]), Opposite { bulge: Some(bulge), ..found }))
+        };
+        let others: BTreeSet<NodeId> = self.other_nodes.difference(&self.designed_nodes).copied().collect();
+        others.iter().filter_map(facing_one).collect()
+    }
+
+    /// Where the ray from a node of the body's surface into the body leaves it, if it does not begin outside.
+    fn through(&self, node: NodeId, origin: Point, along: Point) -> Option<(Hit, [NodeId; 3])> {
+        let leans = |corners: &[Point; 3]| {
+            let normal = area_vector(*corners);
+            dot(normal, along) / norm(normal)
+        };
+        let at_node = self.at_node.get(&node)?.iter();
+        at_node.map(|&face| leans(&self.corners[face])).any(|lean| lean <= -GRAZING).then_some(())?;
+        let (met, nodes) = self.nearest(origin, along, |corners| leans(corners).abs() >= GRAZING)?;
+        (dot(met.normal, along) > 0.0).then_some((met, nodes))
     }
 
     fn are_designed_at(&self, node: NodeId) -> bool {
@@ -273,6 +352,16 @@ impl BodyFaces {
         let met = hits.filter_map(|i| Some((hit(origin, direction, &self.corners[i])?, self.nodes[i])));
         met.min_by(|a, b| a.0.distance.total_cmp(&b.0.distance))
     }
+}
+
+/// The unit vector along the mean of three directions.
+fn mean(directions: &[Point; 3], weights: Point) -> Point {
+    let sum = add(
+        add(directions[0].map(|c| weights[0] * c), directions[1].map(|c| weights[1] * c)),
+        directions[2].map(|c| weights[2] * c),
+    );
+    let length = norm(sum);
+    sum.map(|c| c / length)
 }
 
 /// Whether a ray runs along a triangle rather than through it.

@@ -43,6 +43,9 @@ pub struct BhPoint {
     pub energy: f64,
 }
 
+/// How many times the least slope `dH/dB` the slope at the knee is.
+const BEYOND_KNEE: f64 = 10.0;
+
 /// Where the knee of a closed form is looked for [T]: beyond all magnetic materials.
 const HIGHEST: f64 = 20.0;
 
@@ -125,21 +128,20 @@ impl BhCurve {
         }
     }
 
-    /// The `B` [T] above which the differential permeability is less than a tenth of its largest; of a table the least of its
-    /// points. `None` where there is none.
+    /// The `B` [T] above which the differential permeability is less than a tenth of its largest; of a table of the largest at its
+    /// points, and its last point where it is nowhere less. `None` where there is none.
     pub fn knee(&self) -> Option<f64> {
-        let law = match &self.0 {
-            Law::Table(table) => return Some(table.knee()),
-            Law::Analytic(law) => law,
+        let (largest, [mut low, mut high]) = match &self.0 {
+            Law::Table(table) => table.around_knee(),
+            Law::Analytic(law) => (law.at(0.0).slope, [0.0, HIGHEST]),
         };
-        let limit = 10.0 * law.at(0.0).slope;
-        let (mut low, mut high) = (0.0, HIGHEST);
-        if law.at(high).slope <= limit {
+        let limit = BEYOND_KNEE * largest;
+        if low < high && self.at(high).slope <= limit {
             return None;
         }
         while high - low > 1e-9 {
             let middle = 0.5 * (low + high);
-            if law.at(middle).slope <= limit { low = middle } else { high = middle }
+            if self.at(middle).slope <= limit { low = middle } else { high = middle }
         }
         Some(high)
     }

@@ -5,7 +5,7 @@
 //! point the material is saturated: `h = H_N + (b − B_N)/μ0`; the slope is continuous there where the table ends at less than
 //! twice the permeability of vacuum ([`Table::ends_saturated`]).
 
-use super::BhPoint;
+use super::{BEYOND_KNEE, BhPoint};
 use crate::material::VACUUM_PERMEABILITY;
 
 /// A monotone table of `H` over `B`.
@@ -175,11 +175,25 @@ impl Table {
         [self.field_strength[last], self.flux_density[last]]
     }
 
-    /// The least of the points' `B` [T] above which the differential permeability is less than a tenth of its largest.
-    pub(super) fn knee(&self) -> f64 {
+    /// The least slope `dH/dB` [m/H] at a point, and the `B` [T] of the last place where it is no more than [`BEYOND_KNEE`] of that, and of
+    /// one behind, of the points and of those between two where the slope is least.
+    pub(super) fn around_knee(&self) -> (f64, [f64; 2]) {
         let least = self.slope.iter().copied().fold(f64::INFINITY, f64::min);
-        let last_soft = self.slope.iter().rposition(|&slope| slope <= 10.0 * least);
-        last_soft.and_then(|i| self.flux_density.get(i + 1)).copied().unwrap_or(self.end()[1])
+        let between = |i: usize| {
+            let [low, high] = [self.flux_density[i], self.flux_density[i + 1]];
+            let [from, middle, to] = [low, 0.5 * (low + high), high].map(|b| self.within(i, b).slope);
+            // A parabola through the three.
+            let curvature = 2.0 * (from + to - 2.0 * middle);
+            let share = -(4.0 * middle - 3.0 * from - to) / (2.0 * curvature);
+            (curvature > 0.0 && share > 0.0 && share < 1.0).then(|| low + share * (high - low))
+        };
+        let last = self.flux_density.len() - 1;
+        let places = |i: usize| [Some(self.flux_density[i]), between(i)].into_iter().flatten();
+        let mut places: Vec<f64> = (0..last).flat_map(places).collect();
+        places.push(self.flux_density[last]);
+        let is_soft = |&b: &f64| self.at(b).slope <= BEYOND_KNEE * least;
+        let low = places.iter().rposition(is_soft).expect("the least is no more than ten times itself");
+        (least, [places[low], places[(low + 1).min(places.len() - 1)]])
     }
 
     /// The first point `[H, B]` where the polarisation is [`FALLING`] of the most before it, or less.
@@ -264,6 +278,7 @@ fn slopes(b: &[f64], h: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bh::BhCurve;
 
     /// Points of `B = μ0 H + 1.8 (1 − exp(−H/900))`.
     fn saturating(points: usize) -> Vec<[f64; 2]> {
@@ -294,6 +309,25 @@ mod tests {
             let next = curve.at(b + 1e-13);
             assert!((next.slope / at.slope - 1.0).abs() < 1e-3, "{b}");
         }
+    }
+
+    #[test]
+    fn the_knee_lies_between_points_where_the_differential_permeability_is_a_tenth() {
+        for points in [
+            &[[100.0, 1.0], [1000.0, 1.5], [1e5, 1.7]][..],
+            &[[50.0, 0.5], [90.0, 1.0], [3e3, 1.6], [4e4, 1.9]],
+        ] {
+            let curve = BhCurve::new(points).expect("it rises");
+            let knee = curve.knee().expect("it saturates");
+            assert!(points.iter().all(|[_, b]| (knee - b).abs() > 1e-3), "{knee}");
+            let slope_at = |b: f64| curve.at(b).slope;
+            let largest = points.iter().map(|[_, b]| slope_at(*b)).fold(slope_at(0.0), f64::min);
+            assert!((slope_at(knee) / (10.0 * largest) - 1.0).abs() < 1e-6, "{knee}");
+            assert!([0.01, 0.1, 0.5].iter().all(|more| slope_at(knee + more) > 10.0 * largest), "{knee}");
+        }
+        // One that does not saturate within its table has its end.
+        let straight = BhCurve::new(&[[100.0, 1.0], [200.0, 2.0]]).expect("it rises");
+        assert_eq!(straight.knee(), Some(2.0));
     }
 
     #[test]

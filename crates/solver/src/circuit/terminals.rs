@@ -20,8 +20,8 @@ pub struct CoilTerminals {
     /// Flux linkage [Wb].
     pub flux_linkage: c64,
     /// Resistance [Ω]: that of the winding, and that of the losses that its current alone makes in the field; above 0 Hz beside iron
-    /// that saturates `Re(V/I)` of the state.
-    pub resistance: f64,
+    /// that saturates `Re(V/I)` of the state, and `None` without a current or a voltage of its own.
+    pub resistance: Option<f64>,
     /// Voltage across the coil with its resistance, without what else is in series [V].
     pub voltage: c64,
 }
@@ -153,6 +153,8 @@ pub fn terminals(
         let flux_linkage = windings.linkage(k, model, mesh, solution);
         let current = windings.current(k, model, solution);
         let wire = driven.winding.resistance;
+        let is_at_rest = current == c64::default() || driven.winding.voltage == Some(c64::default());
+        let is_known = model.is_linear() || angular_frequency == 0.0 || !is_at_rest;
         let apparent = if current == c64::default() { current } else { flux_linkage / current };
         let inductance = mutual.get(k).map_or(apparent, |row| row[k]);
         CoilTerminals {
@@ -160,7 +162,7 @@ pub fn terminals(
             current,
             flux_linkage,
             // Re(jωL) = −ω Im L.
-            resistance: wire - angular_frequency * inductance.im,
+            resistance: is_known.then_some(wire - angular_frequency * inductance.im),
             voltage: driven.voltage(model, current, flux_linkage),
         }
     };

@@ -44,7 +44,7 @@ fn coil(mesh: &Mesh, name: &str, ends: [&str; 2], current: f64) -> Coil {
 
 /// `L + R/(jω)` of the first coil times `jω` [Ω].
 fn impedance(found: &Terminals, omega: f64) -> c64 {
-    c64::new(found.coils[0].resistance, omega * found.inductance[0][0])
+    c64::new(found.coils[0].resistance.expect("all is linear"), omega * found.inductance[0][0])
 }
 
 /// A bar through a box, beside a plate and a coil of a region; cells of 5 mm, and so many in each.
@@ -163,7 +163,10 @@ fn at_rest_a_bar_has_the_resistance_of_its_section() {
         let [rest, slow] = [0.0, 0.1].map(|frequency| of(elements, frequency));
         for found in [&rest, &slow] {
             let current = found.coils[0].current;
-            assert!((found.coils[0].resistance / (3.0 * resistance) - 1.0).abs() < 1e-6, "{found:?}");
+            assert!(
+                (found.coils[0].resistance.expect("all is linear") / (3.0 * resistance) - 1.0).abs() < 1e-6,
+                "{found:?}"
+            );
             // ωL is 1.4e-4 of the resistance, of which |Z| has half the square.
             assert!((current.norm() * 3.0 * resistance / 0.1 - 1.0).abs() < 1e-7, "{found:?}");
         }

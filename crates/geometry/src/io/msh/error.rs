@@ -151,6 +151,11 @@ pub enum MshFault {
     /// The mesh is cut into partitions.
     #[error("the mesh is partitioned, which is not read: save it without partitions")]
     Partitioned,
+    /// Nodes with coordinates on curves and surfaces, which version 2.2 has in a section of their own.
+    #[error(
+        "nodes have parametric coordinates: save the mesh with Mesh.SaveParametric = 0, or in format 4.1"
+    )]
+    Parametric,
     /// A name that cannot be a name.
     #[error("the name `{name}` {problem}: give the group another name")]
     Name {

@@ -130,6 +130,7 @@ impl Sections {
             ("PartitionedEntities" | "GhostElements", _) => {
                 return Err(Refused::Section(MshFault::Partitioned));
             }
+            ("ParametricNodes", Version::V2) => return Err(Refused::Section(MshFault::Parametric)),
             ("PhysicalNames" | "Entities", _) if self.nodes.is_some() => return order("before $Nodes"),
             ("PhysicalNames", _) if self.entities.is_some() => return order("before $Entities"),
             ("Elements", _) if self.nodes.is_none() => return order("after $Nodes"),
