@@ -56,8 +56,16 @@ pub(crate) fn keys_of_advice(error: &Error) -> Option<&'static str> {
 }
 
 /// What to change in a configuration where a coil meets a surface as it may not; `None` where the error says it all.
-fn plane_advice(fault: &PlaneFault) -> Option<&'static str> {
+fn plane_advice(fault: &PlaneFault, shape: Option<&CoilShape>) -> Option<&'static str> {
     match fault {
+        PlaneFault::Crossing { .. } | PlaneFault::TangentialSource
+            if matches!(shape, Some(CoilShape::Region(_))) =>
+        {
+            Some(
+                "name the surface in boundaries.flux_parallel; around a conductor that is an impedance surface, leave an element of air \
+                 between the winding and its corners, or mesh it (model = \"volume\")",
+            )
+        }
         PlaneFault::Crossing { .. } | PlaneFault::TangentialSource => Some(
             "name the surface in boundaries.flux_parallel, or move the coil away; around a conductor that is an impedance \
                  surface, make the coil a region of the mesh",
@@ -161,7 +169,8 @@ impl Blame<'_> {
             SolverError::NoSource { coil, .. } => self.at(&self.coil_place(coil)?, error),
             SolverError::SourceOnBoundary { coil, surface, reason, .. } => {
                 let mut fault = self.at(&self.coil_place(coil)?, error)?;
-                if let Some(advice) = plane_advice(reason) {
+                let shape = self.config.coils.iter().find(|own| own.name == *coil).map(|own| &own.shape);
+                if let Some(advice) = plane_advice(reason, shape) {
                     fault.help = Some(advice.to_owned());
                 }
                 Some(match self.surface("boundaries", surface) {

@@ -42,6 +42,12 @@ impl Equations {
         &self.windings
     }
 
+    /// Whether the reactance of something in series is that of a capacitance.
+    pub(crate) fn have_capacitance(&self) -> bool {
+        let mut driven = self.windings.with_source().map(|(driven, _)| driven);
+        driven.any(|own| own.winding.impedance(self.angular_frequency).im < 0.0)
+    }
+
     /// What solid conductors add to the field's matrix.
     pub(crate) fn solids(&self) -> &SolidRows {
         &self.solids

@@ -136,6 +136,33 @@ fn voltages_drive_the_currents_that_need_them_beside_saturated_iron() {
     }
 }
 
+/// At, below and above resonance, where the residual measures no error of the field: Newton's steps are held against what they ask for.
+#[test]
+fn a_capacitance_in_series_beside_saturated_iron_has_a_state() {
+    let mesh = bar_in_a_box();
+    let of = |setup| crate::solved(&mesh, setup);
+    let iron = (IRON, Some(law()));
+    let (given, state) = of(setup(&mesh, ALL[2], iron.clone(), (CURRENTS, [None; 2])));
+    let seen = &terminals(&given, &mesh, &state).expect("terminals").coils[1];
+    let omega = given.angular_frequency();
+    let reactance = omega * (seen.flux_linkage / seen.current).re;
+    for share in [0.3, 0.9, 1.0, 1.1, 3.0] {
+        let capacitance = 1.0 / (omega * share * reactance);
+        let voltage = seen.voltage + c64::new(0.0, -share * reactance) * seen.current;
+        let mut driven = setup(&mesh, ALL[2], iron.clone(), ([CURRENTS[0], c64::default()], [None; 2]));
+        let series = Winding { series_capacitance: Some(capacitance), ..SERIES[1] };
+        driven.windings[1] = Some(Winding { voltage: Some(voltage), ..series });
+        let (model, state) = of(driven);
+        let found = &terminals(&model, &mesh, &state).expect("terminals").coils[1];
+        let source = found.voltage + (series.impedance(omega) - series.resistance) * found.current;
+        println!("{share}: {} steps, {} for {} A", state.newton_steps(), found.current, seen.current);
+        assert!(
+            state.report().residual < 1e-10 && (source / voltage - 1.0).norm() < 1e-8,
+            "{share}: {source} {voltage}"
+        );
+    }
+}
+
 #[test]
 fn derivatives_of_what_voltages_drive_beside_saturated_iron_match_differences() {
     let mesh = bar_in_a_box();

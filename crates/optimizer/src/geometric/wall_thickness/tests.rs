@@ -214,8 +214,7 @@ fn a_dent_between_the_rays_is_measured_from_its_own_node() {
         let moved = if is_designed { height(at) } else { 0.0 };
         std::array::from_fn(|d| at[d] + moved * direction[d])
     };
-    let (_, moved) =
-        thickness.walls(place).find(|(_, wall)| wall.bulge.is_some()).expect("the same walls everywhere");
+    let (_, moved) = thickness.walls(place).find(is_thinner).expect("the same walls everywhere");
     let above = [0.5 + (1.0 - depth) * slope, 0.5, 1.0];
     assert!((moved.thickness - wall.thickness - height(above)).abs() < 1e-12);
 }

@@ -13,7 +13,7 @@
 //! iron (ferroresonance).
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::fem::scalar::{axpy, norm, ordered_sum};
+use fluxmorph_geometry::fem::scalar::{axpy, norm};
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
 use rayon::prelude::*;
 
@@ -22,7 +22,6 @@ use crate::circuit::{Equations, Excitation, SolidRows};
 use crate::element::Complex3;
 use crate::element::tensor::MOST_POINTS;
 use crate::error::{NonConvergence, SolverError};
-use crate::line_search;
 use crate::linear::gmres::{self, Ended};
 use crate::linear::{Left, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
@@ -31,14 +30,10 @@ use crate::newton_steps::{Descent, MOST_STEPS, StepSystems, Verdict};
 use crate::solution::FieldSolution;
 use crate::tangents::Tangents;
 
+mod search;
+
 /// Elements whose integrals are held at once: some megabytes.
 const CHUNK: usize = 8192;
-
-/// Halvings of one step: Newton's direction lowers the residual, so that one of them is short enough.
-const MOST_HALVINGS: usize = 12;
-
-/// The part of the promised decrease of the residual that is asked for (Nocedal and Wright: 1e-4).
-const ARMIJO: f64 = 1e-4;
 
 /// A residual of a step's own system [1], at most: Newton's method need not know its direction better far from the solution.
 const LOOSEST: f64 = 1e-2;
@@ -378,44 +373,6 @@ impl<'a> Problem<'a> {
         let points = model.elements_with_a_law().par_iter().map(of_element).collect();
         HarmonicTangent { model: model.clone(), mesh: self.mesh.clone(), matrix: self.matrix.clone(), points }
     }
-
-    /// A length of a step that lowers the residual, first the one at which it has next to no part along the step: a new iterate with
-    /// it. The residual is measured by `Re rᴴS⁻¹r` with the matrix `S` that is nearest to the derivative, as an error of the field:
-    /// unlike its plain norm that does not ask saturated iron, whose reluctivity is a thousand times that of the rest, to come first.
-    fn search(
-        &self,
-        from: &Iterate,
-        step: &[c64],
-        nearest: &mut PreparedSystem,
-    ) -> Result<Option<(Iterate, f64)>, SolverError> {
-        // Over the rows of the field, the first.
-        let product = |a: &[c64], b: &[c64]| ordered_sum(a.len(), |i| a[i].re * b[i].re + a[i].im * b[i].im);
-        let mut measure = |residual: &[c64]| -> Result<f64, SolverError> {
-            Ok(product(residual, &nearest.solve_once(residual)?.0))
-        };
-        let place = |length: f64| {
-            let mut values = from.values.clone();
-            axpy(c64::from(length), step, &mut values);
-            self.at(values)
-        };
-        let along = line_search::longest_useful(product(&from.residual, step), |length| {
-            let trial = place(length);
-            (product(&trial.residual, step), trial)
-        });
-        if along.is_level {
-            return Ok(Some((along.state, along.length)));
-        }
-        let before = measure(&from.residual)?;
-        let (mut length, mut trial) = (along.length, along.state);
-        for _ in 0..MOST_HALVINGS {
-            if measure(&trial.residual)? <= (1.0 - ARMIJO * length.min(1.0)) * before {
-                return Ok(Some((trial, length)));
-            }
-            length *= 0.5;
-            trial = place(length);
-        }
-        Ok(None)
-    }
 }
 
 /// `a + b`
@@ -471,7 +428,8 @@ pub(crate) fn solve(
         let (step, LinearSolverReport { iterations: own, .. }) =
             tangent.invert(Side::State, &right_side, &mut system, tolerance)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
-        let found = if goes_on { problem.search(&iterate, &step, &mut system)? } else { None };
+        let found =
+            if goes_on { problem.search_from(&iterate, &step, (&tangent, &mut system))? } else { None };
         let Some((next, length)) = found else {
             let left = [&iterate.values[..], &right_side, &step];
             let is_state = worst <= settings.required && problem.is_rounding(left, (&system, systems));
