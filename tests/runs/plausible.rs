@@ -462,8 +462,8 @@ fn a_tolerance_that_no_mesh_is_refined_for_is_said_by_check() {
     assert!(check(&[&tolerance[..], &["analysis.order=2"]].concat()).contains(said));
     assert!(!check(&tolerance).contains("accuracy.tolerance needs"));
     let curve = [
-        "materials.steel={bh=\"team20_steel\"}",
-        "regions.plate.model=\"volume\"",
+        "materials.iron={bh=\"team20_steel\"}",
+        "regions.plate={material=\"iron\", model=\"volume\"}",
         "remesh.region=[\"plate\", \"remesh\"]",
     ];
     assert!(
