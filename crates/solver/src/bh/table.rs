@@ -185,7 +185,7 @@ impl Table {
             // A parabola through the three.
             let curvature = 2.0 * (from + to - 2.0 * middle);
             let share = -(4.0 * middle - 3.0 * from - to) / (2.0 * curvature);
-            (curvature > 0.0 && share > 0.0 && share < 1.0).then(|| low + share * (high - low))
+            (curvature > 0.0 && share > 0.0 && share < 1.0).then_some(low + share * (high - low))
         };
         let last = self.flux_density.len() - 1;
         let places = |i: usize| [Some(self.flux_density[i]), between(i)].into_iter().flatten();
