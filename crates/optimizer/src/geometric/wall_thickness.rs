@@ -125,7 +125,7 @@ impl WallThickness {
         let by_node = nodes.map(opposite_of).collect::<Option<Vec<_>>>()?;
         let with_place = |(i, found): (usize, Vec<Opposite>)| found.into_iter().map(move |own| (i, own));
         let mut opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(with_place).collect();
-        let facing: Vec<_> = of.iter().flat_map(|(_, own)| own.facing(mesh, surface, &opposite)).collect();
+        let facing: Vec<_> = of.values().flat_map(|own| own.facing(mesh, surface, &opposite)).collect();
         opposite.extend(facing);
         opposite.sort_by_key(|&(place, _)| place);
         (!opposite.is_empty()).then_some(Self { opposite })
