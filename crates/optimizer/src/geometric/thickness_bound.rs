@@ -231,3 +231,28 @@ fn opposite_moves(shape: &Shape, thickness: &WallThickness) -> bool {
     let (map, designed) = (shape.motion().map(), shape.surface().nodes());
     thickness.opposite_nodes().any(|n| designed.binary_search(&n).is_ok() || map.is_unknown(n))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fluxmorph_geometry::NodeId;
+
+    #[test]
+    fn a_wall_before_a_node_opposite_counts_where_it_is_beyond_what_is_kept_back() {
+        let wall = |bulge| Wall { thickness: 1.0, derivatives: [(NodeId(0), [0.0; 3]); 4], bulge };
+        let (least, most) = (ThicknessLimit::Minimum(0.5), ThicknessLimit::Maximum(0.5));
+        for (bulge, of_least, of_most) in [
+            (None, true, true),
+            (Some(0.0051), true, false),
+            (Some(0.0049), false, false),
+            (Some(-0.0049), false, false),
+            (Some(-0.0051), false, true),
+        ] {
+            assert_eq!(
+                [least, most].map(|bound| counts(bound, &wall(bulge))),
+                [of_least, of_most],
+                "{bulge:?}"
+            );
+        }
+    }
+}
