@@ -55,7 +55,7 @@ impl Problem<'_> {
 
     /// A length of Newton's own step. Where a capacitance is in series the residual is no error of a field: what the derivative at the
     /// start makes of the residual has to become shorter (the natural monotonicity of P. Deuflhard, Newton Methods for Nonlinear
-    /// Problems, 3.1), or, as it may at turning points, does not, and the residual decides.
+    /// Problems, chapter 3), or, as it may at turning points, does not, and the residual decides.
     pub(super) fn search_from(
         &self,
         from: &Iterate,
