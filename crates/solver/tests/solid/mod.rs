@@ -163,10 +163,8 @@ fn at_rest_a_bar_has_the_resistance_of_its_section() {
         let [rest, slow] = [0.0, 0.1].map(|frequency| of(elements, frequency));
         for found in [&rest, &slow] {
             let current = found.coils[0].current;
-            assert!(
-                (found.coils[0].resistance.expect("all is linear") / (3.0 * resistance) - 1.0).abs() < 1e-6,
-                "{found:?}"
-            );
+            let of_bar = found.coils[0].resistance.expect("all is linear");
+            assert!((of_bar / (3.0 * resistance) - 1.0).abs() < 1e-6, "{found:?}");
             // ωL is 1.4e-4 of the resistance, of which |Z| has half the square.
             assert!((current.norm() * 3.0 * resistance / 0.1 - 1.0).abs() < 1e-7, "{found:?}");
         }
