@@ -56,10 +56,10 @@ pub(crate) fn keys_of_advice(error: &Error) -> Option<&'static str> {
 }
 
 /// What to change in a configuration where a coil meets a surface as it may not; `None` where the error says it all.
-fn plane_advice(fault: &PlaneFault, shape: Option<&CoilShape>) -> Option<&'static str> {
+fn plane_advice(fault: &PlaneFault, shape: &CoilShape) -> Option<&'static str> {
     match fault {
         PlaneFault::Crossing { .. } | PlaneFault::TangentialSource
-            if matches!(shape, Some(CoilShape::Region(_))) =>
+            if matches!(shape, CoilShape::Region(_)) =>
         {
             Some(
                 "name the surface in boundaries.flux_parallel; around a conductor that is an impedance surface, leave an element of air \
@@ -145,12 +145,15 @@ impl Blame<'_> {
         Some(format!("coils[{index}]"))
     }
 
+    /// What a coil is.
+    fn shape_of_coil(&self, name: &str) -> Option<&CoilShape> {
+        self.config.coils.iter().find(|coil| coil.name == name).map(|coil| &coil.shape)
+    }
+
     /// The key of the position of a coil.
     fn coil_place(&self, name: &str) -> Option<String> {
-        let index = self.config.coils.iter().position(|coil| coil.name == name)?;
-        let key =
-            if matches!(self.config.coils[index].shape, CoilShape::Region(_)) { "region" } else { "center" };
-        Some(format!("coils[{index}].{key}"))
+        let key = if matches!(self.shape_of_coil(name)?, CoilShape::Region(_)) { "region" } else { "center" };
+        Some(format!("{}.{key}", self.coil(name)?))
     }
 
     fn solver(&self, error: &SolverError) -> Option<Diagnostic> {
@@ -169,8 +172,7 @@ impl Blame<'_> {
             SolverError::NoSource { coil, .. } => self.at(&self.coil_place(coil)?, error),
             SolverError::SourceOnBoundary { coil, surface, reason, .. } => {
                 let mut fault = self.at(&self.coil_place(coil)?, error)?;
-                let shape = self.config.coils.iter().find(|own| own.name == *coil).map(|own| &own.shape);
-                if let Some(advice) = plane_advice(reason, shape) {
+                if let Some(advice) = plane_advice(reason, self.shape_of_coil(coil)?) {
                     fault.help = Some(advice.to_owned());
                 }
                 Some(match self.surface("boundaries", surface) {

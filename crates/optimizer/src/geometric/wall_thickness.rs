@@ -19,8 +19,9 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 use fluxmorph_geometry::box_tree::BoxTree;
+use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::ray::{Hit, hit, reach};
-use fluxmorph_geometry::tet4::{Point, add, area_vector, dot, norm};
+use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
 use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
@@ -134,9 +135,8 @@ impl WallThickness {
     /// The same on a mesh in which every node has another number; `None` where it lacks one of them.
     pub fn renumbered(&self, new_of: &[Option<NodeId>]) -> Option<Self> {
         let renumber = |(place, own): &(usize, Opposite)| {
-            let [node, a, b, c] =
-                [own.node, own.nodes[0], own.nodes[1], own.nodes[2]].map(|n| new_of[n.index()]);
-            Some((*place, Opposite { node: node?, nodes: [a?, b?, c?], ..*own }))
+            let [a, b, c] = own.nodes.map(|n| new_of[n.index()]);
+            Some((*place, Opposite { node: new_of[own.node.index()]?, nodes: [a?, b?, c?], ..*own }))
         };
         Some(Self { opposite: self.opposite.iter().map(renumber).collect::<Option<_>>()? })
     }
@@ -356,12 +356,7 @@ impl BodyFaces {
 
 /// The unit vector along the mean of three directions.
 fn mean(directions: &[Point; 3], weights: Point) -> Point {
-    let sum = add(
-        add(directions[0].map(|c| weights[0] * c), directions[1].map(|c| weights[1] * c)),
-        directions[2].map(|c| weights[2] * c),
-    );
-    let length = norm(sum);
-    sum.map(|c| c / length)
+    unit(std::array::from_fn(|d| (0..3).map(|k| weights[k] * directions[k][d]).sum()))
 }
 
 /// Whether a ray runs along a triangle rather than through it.

@@ -141,14 +141,20 @@ impl Table {
         self.within(self.flux_density.partition_point(|&start| start <= b).saturating_sub(1), b)
     }
 
+    /// Length of interval `i` [T], and the coefficients of `s²` and `s³` of its cubic over that length, `s` from 0 to 1.
+    #[inline]
+    fn cubic(&self, i: usize) -> (f64, [f64; 2]) {
+        let length = self.flux_density[i + 1] - self.flux_density[i];
+        let secant = (self.field_strength[i + 1] - self.field_strength[i]) / length;
+        let (m, n) = (self.slope[i], self.slope[i + 1]);
+        (length, [3.0 * secant - 2.0 * m - n, m + n - 2.0 * secant])
+    }
+
     /// The cubic of interval `i`.
     #[inline]
     fn within(&self, i: usize, b: f64) -> BhPoint {
-        let length = self.flux_density[i + 1] - self.flux_density[i];
-        let start = self.field_strength[i];
-        let secant = (self.field_strength[i + 1] - start) / length;
-        let (m, n) = (self.slope[i], self.slope[i + 1]);
-        let (square, cube) = (3.0 * secant - 2.0 * m - n, m + n - 2.0 * secant);
+        let (length, [square, cube]) = self.cubic(i);
+        let (start, m) = (self.field_strength[i], self.slope[i]);
         let s = (b - self.flux_density[i]) / length;
         BhPoint {
             field_strength: start + length * s * (m + s * (square + s * cube)),
@@ -180,12 +186,9 @@ impl Table {
     pub(super) fn around_knee(&self) -> (f64, [f64; 2]) {
         let least = self.slope.iter().copied().fold(f64::INFINITY, f64::min);
         let between = |i: usize| {
-            let [low, high] = [self.flux_density[i], self.flux_density[i + 1]];
-            let [from, middle, to] = [low, 0.5 * (low + high), high].map(|b| self.within(i, b).slope);
-            // A parabola through the three.
-            let curvature = 2.0 * (from + to - 2.0 * middle);
-            let share = -(4.0 * middle - 3.0 * from - to) / (2.0 * curvature);
-            (curvature > 0.0 && share > 0.0 && share < 1.0).then_some(low + share * (high - low))
+            let (length, [square, cube]) = self.cubic(i);
+            let s = -square / (3.0 * cube);
+            (cube > 0.0 && s > 0.0 && s < 1.0).then_some(self.flux_density[i] + s * length)
         };
         let last = self.flux_density.len() - 1;
         let places = |i: usize| [Some(self.flux_density[i]), between(i)].into_iter().flatten();
