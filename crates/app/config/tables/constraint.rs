@@ -90,7 +90,7 @@ table! {
         lower: Option<Unread> = SOME_QUANTITY;
         /// The least value as a multiple of that of the initial design, which must be positive.
         lower_ratio: Option<f64> = number(POSITIVE);
-        /// For `thickness`: the least thickness, measured at every node of the design surface [m]. At least one of `minimum` and `maximum` is needed.
+        /// For `thickness`: the least thickness, measured at every node of the design surface and of the face opposite [m]. At least one of `minimum` and `maximum` is needed.
         minimum: Option<f64> = length(POSITIVE);
         /// For `thickness`: the greatest thickness [m].
         maximum: Option<f64> = length(POSITIVE);
