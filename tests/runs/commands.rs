@@ -194,17 +194,25 @@ fn a_probe_that_the_moving_plate_swallows_is_left_out_of_the_result() {
 /// Where B jumps, a point on the face has the field of one side.
 #[test]
 fn a_probe_on_a_face_of_iron_or_at_its_edge_is_asked_about() {
-    let warnings = |point: &str, permeability: &str| {
+    let of_model = |model: &str, point: &str, permeability: &str| {
+        let model = format!("regions.plate.model={model}");
         let point = format!("probes[0].points=[[{point}]]");
         let material = format!("materials.steel.relative_permeability={permeability}");
-        let further = ["--json", "--set", &point, "--set", &material, "--set", "regions.plate.model=volume"];
+        let further = ["--json", "--set", &point, "--set", &material, "--set", &model];
         let checked = finish(command(&[&"check", &quick()]).args(further)).exits_with(0).json();
         checked["warnings"].to_string()
     };
+    let warnings = |point: &str, permeability: &str| of_model("volume", point, permeability);
     let [on_the_face, beside_the_edge] = ["0.01, 0.01, -0.01", "0.1203, 0.01, -0.0103"];
     let named = "between `remesh` and `plate`, where B jumps: it is that in `remesh`";
     assert!(warnings(on_the_face, "100").contains(named));
     assert!(warnings(beside_the_edge, "100").contains("is 0.424 mm from an edge of iron"));
+    for model in ["impedance", "perfect"] {
+        assert!(
+            of_model(model, beside_the_edge, "1").contains("is 0.424 mm from an edge of iron"),
+            "{model}"
+        );
+    }
     let silent = [
         (on_the_face, "1"),
         (beside_the_edge, "1"),

@@ -461,14 +461,15 @@ fn a_tolerance_that_no_mesh_is_refined_for_is_said_by_check() {
     let tolerance = ["analysis.elements=edge", "accuracy.tolerance=5 %"];
     assert!(check(&[&tolerance[..], &["analysis.order=2"]].concat()).contains(said));
     assert!(!check(&tolerance).contains("accuracy.tolerance needs"));
-    let curve = [
-        "materials.iron={bh=\"team20_steel\"}",
-        "regions.plate={material=\"iron\", model=\"volume\"}",
-        "remesh.region=[\"plate\", \"remesh\"]",
-    ];
-    assert!(
-        check(&[&tolerance[..], &curve].concat()).contains("beside a B–H curve there is none above 0 Hz")
-    );
+}
+
+/// Whatever its material has.
+#[test]
+fn a_perfect_conductor_is_no_iron() {
+    let nodal = ["analysis.elements=nodal", "regions.plate.model=perfect"];
+    let material = |mu: u32| format!("materials.steel={{ relative_permeability = {mu}, conductivity = 0 }}");
+    let [iron, none] = [5000, 1].map(|mu| check(&[&nodal[..], &[&material(mu)]].concat()));
+    assert_eq!(iron, none);
 }
 
 #[test]

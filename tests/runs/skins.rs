@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use super::plausible::{set, texts};
+use crate::support::changed;
 use crate::support::folder::{RunFolder, number, read_text};
 use crate::support::program::{command, finish, folder};
 use crate::support::shield::quick;
@@ -76,4 +77,30 @@ fn a_control_grid_that_the_mesh_does_not_follow_is_asked_about() {
     let fine = texts(&check(&["design.grid=[7, 60]"])["warnings"]);
     assert!(fine.contains("design.grid has a point every 4.068 mm along y"), "{fine}");
     assert!(!texts(&check(&["design.grid=[7, 13]"])["warnings"]).contains("design.grid"));
+}
+
+/// An impedance surface has to be possible wherever the mesh is too coarse, and where it is not: the plate is 10 mm thick.
+#[test]
+fn a_model_is_advised_where_it_serves_all_frequencies() {
+    let home = folder();
+    let config = home.path().join("plate.toml");
+    let said = |frequencies: &str, model: &str| {
+        let frequencies = format!("frequencies = [{frequencies}]");
+        let text = changed(&read_text(&quick()), &[("frequency = \"60 Hz\"", &frequencies)]);
+        std::fs::write(&config, text).expect("written");
+        let model = format!("regions.plate.model={model}");
+        let plain = "materials.steel={ relative_permeability = 1, conductivity = \"3.5e7 S/m\" }";
+        let overrides = [IRON[0], plain, "design.lower=\"-1 mm\"", &model, IRON[2]];
+        let overrides = &overrides[..if model.ends_with("volume") { 5 } else { 4 }];
+        let checked = finish(command(&[&"check", &config, &"--json"]).args(set(overrides)));
+        texts(&checked.exits_with(0).json()["warnings"])
+    };
+    let surface = "or use model = \"impedance\"";
+    assert!(said("\"20 kHz\", \"50 kHz\"", "volume").contains(surface));
+    for frequencies in ["\"50 Hz\", \"50 kHz\"", "0, \"50 kHz\""] {
+        let found = said(frequencies, "volume");
+        assert!(found.contains("Refine the skin") && !found.contains(surface), "{frequencies}: {found}");
+    }
+    let found = said("\"1 Hz\", \"50 kHz\"", "impedance");
+    assert!(found.contains("these are too thick for the skin depth at 50000 Hz"), "{found}");
 }

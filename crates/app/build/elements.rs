@@ -201,7 +201,8 @@ fn nodal_iron<'a>(config: &Config, mesh: &'a Mesh, audits: &[Audited]) -> Option
 /// The region that carries most flux, at the frequency at which it does.
 fn strongest_iron<'a>(config: &Config, mesh: &'a Mesh, audits: &[Audited]) -> Option<Iron<'a>> {
     let is_static = config.frequencies().contains(&0.0);
-    let iron = mesh.topology().region_names().iter().map(|region| {
+    let of_matter = mesh.topology().region_names().iter().filter(|name| config.is_meshed(name));
+    let iron = of_matter.map(|region| {
         let material = material(config, region);
         let relative_permeability = material.relative_permeability;
         let carrying = if is_static || material.conductivity == 0.0 {

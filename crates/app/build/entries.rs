@@ -28,6 +28,12 @@ pub(crate) fn is_wound(config: &Config, region: &str) -> bool {
     config.coils.iter().any(of)
 }
 
+/// The coil whose solid conductor a region is.
+pub(super) fn solid_coil<'a>(config: &'a Config, region: &str) -> Option<&'a Coil> {
+    let is_there = |coil: &&Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == region);
+    config.coils.iter().filter(|coil| coil.is_solid()).find(is_there)
+}
+
 /// Mass density [kg/m³] of a region's material, if it is given.
 pub(super) fn density(config: &Config, region: &str) -> Option<f64> {
     config.materials.get(&config.regions.get(region)?.material)?.density

@@ -203,7 +203,7 @@ fn problem_on(
         sink.take(source.check(faults).map_err(Error::from))?;
         warnings.extend(plausible::warnings(config, &full_mesh, coils, &open_patches));
         warnings.extend(applied::on_conductors(config, &full_mesh));
-        warnings.extend(probes::warnings(config, &mesh));
+        warnings.extend(probes::warnings(config, &full_mesh, &mesh));
         warnings.extend(functional::warnings(config));
         warnings.extend(loads::sum_warnings(config));
         warnings.extend(elements::warnings(config, &full_mesh, &audits));
@@ -323,17 +323,10 @@ fn optimisation_warnings(config: &Config, constraints: &[Constraint], mode: Mode
                 .to_owned(),
         );
     }
-    if config.accuracy.tolerance.is_some() && mode != Mode::Analysis {
-        let alternates = || config.load_cases().iter().any(|case| case.frequency > 0.0);
-        let needed = if config.analysis.order == ElementOrder::Quadratic {
-            Some("analysis.order = 1")
-        } else if config.saturating_region().is_some() && alternates() {
-            Some("an estimated error, and beside a B–H curve there is none above 0 Hz")
-        } else {
-            None
-        };
-        let text = |needed| format!("accuracy.tolerance needs {needed}: the mesh of a run is not refined");
-        warnings.extend(needed.map(text));
+    let is_second_order = config.analysis.order == ElementOrder::Quadratic;
+    if config.accuracy.tolerance.is_some() && mode != Mode::Analysis && is_second_order {
+        warnings
+            .push("accuracy.tolerance needs analysis.order = 1: the mesh of a run is not refined".to_owned());
     }
     warnings
 }

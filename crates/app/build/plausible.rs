@@ -12,14 +12,14 @@ use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 use fluxmorph_solver::coil::{self, Racetrack};
 
-use super::entries::material;
+use super::entries::{is_magnet, material};
 use super::held::sides;
 use super::references::functionals;
 use super::soundness::{faces_of, faces_without_condition, normal, size};
 use super::thin_windings::{self, section};
 use crate::config::{
     Coil, CoilPath, CoilShape, Compared, ConductorWord, Config, Diagnostic, Functional, LoadCase, MeshConfig,
-    ObjectiveKind, RegionModel, SourceMap,
+    ObjectiveKind, SourceMap,
 };
 
 /// Least width and height of a winding, relative to the size of the mesh: no element is that small, and the field of a thinner
@@ -86,14 +86,14 @@ pub(super) fn coil_faults(
         } else if let Some((region, place)) = matter_in(config, mesh, winding) {
             let name = &mesh.topology().region_names()[region.index()];
             let message = format!(
-                "the current of the coil `{}` flows inside `{name}`, at {}, which is iron or conducts",
+                "the current of the coil `{}` flows inside `{name}`, at {}, which is iron, a magnet or a conductor",
                 built.name,
                 millimetres(place)
             );
             faults.push(
                 source
                     .diagnostic(&format!("coils[{i}].center"), message)
-                    .expected("a winding in air, or in a material without permeability and conductivity")
+                    .expected("a winding in air, or in what is meshed and has no permeability, remanence or conductivity")
                     .help(
                         "move the coil or the region; the strands of a winding are no material of [regions]",
                     ),
@@ -103,20 +103,21 @@ pub(super) fn coil_faults(
     faults
 }
 
-/// Strands in a region whose material has a permeability.
+/// Strands in a region of iron or of a magnet.
 fn strands_in_iron(config: &Config, source: &SourceMap, i: usize) -> Option<Diagnostic> {
     let coil = &config.coils[i];
     let CoilShape::Region(own) = &coil.shape else { return None };
     let is_iron = material(config, &own.region).relative_permeability != 1.0;
-    (is_iron && own.conductor == ConductorWord::Stranded).then(|| {
+    ((is_iron || is_magnet(config, &own.region)) && own.conductor == ConductorWord::Stranded).then(|| {
         let message = format!(
-            "the strands of the coil `{}` fill `{}`, whose material has a permeability: its flux would be that of iron",
+            "the strands of the coil `{}` fill `{}`, whose material has a permeability or a remanence: its flux would be that of \
+             iron or of a magnet",
             coil.name, own.region
         );
         source
             .diagnostic(&format!("coils[{i}].region"), message)
-            .expected("a region without a material of iron")
-            .help("take the material off the region; conductor = \"solid\" is a bar of iron")
+            .expected("a region without a material of iron or of a magnet")
+            .help("take the material or the remanence off the region; conductor = \"solid\" is a bar of iron")
     })
 }
 
@@ -476,14 +477,14 @@ fn half_extent(coil: &Coil) -> Option<[f64; 3]> {
     }
 }
 
-/// A region of iron or of a conductor that the current of a coil flows in, and where.
+/// A region of iron, of a magnet or of a conductor that the current of a coil flows in, and where.
 fn matter_in(config: &Config, mesh: &Mesh, winding: &Racetrack) -> Option<(RegionId, Point)> {
     let topology = mesh.topology();
     let changes = config.alternates();
     let is_matter = |name: &String| {
         let own = material(config, name);
-        let replaced = config.regions.get(name).is_some_and(|region| region.model == RegionModel::Impedance);
-        own.relative_permeability != 1.0 || replaced || (changes && own.conductivity > 0.0)
+        let conducts = changes && own.conductivity > 0.0;
+        own.relative_permeability != 1.0 || is_magnet(config, name) || !config.is_meshed(name) || conducts
     };
     let matter: Vec<bool> = topology.region_names().iter().map(is_matter).collect();
     let region = |e: ElementId| topology.region_of()[e.index()];

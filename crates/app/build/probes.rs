@@ -15,7 +15,7 @@ use super::open;
 use super::soundness::normal;
 use crate::config::{Config, Diagnostic, ElementOrder, Probe, SourceMap};
 
-/// Every probe point outside the mesh, in a region that its surface replaces, or in the shell of open space.
+/// Every probe point outside the mesh that is solved on, in a region that its surface replaces, or in the shell of open space.
 pub(super) fn faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh: &Mesh) -> Vec<Diagnostic> {
     let shell = config.open.as_ref().and_then(|open| mesh.topology().region(open::region_of(open)).ok());
     let mut faults = Vec::new();
@@ -28,10 +28,9 @@ pub(super) fn faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh
                     "a point in the mesh inside the shell, whose places mean others far away".to_owned(),
                 ),
                 Some(_) => continue,
-                None if is_replaced() => (
-                    "in a region that its impedance surface replaces",
-                    "a point in a region that is meshed".to_owned(),
-                ),
+                None if is_replaced() => {
+                    ("in a region that its surface replaces", "a point in a region that is meshed".to_owned())
+                }
                 None => {
                     let [lower, upper] = full_mesh.bounding_box().map(millimetres);
                     let expected = format!("a point inside the mesh, which goes from {lower} to {upper}");
@@ -46,8 +45,9 @@ pub(super) fn faults(config: &Config, source: &SourceMap, full_mesh: &Mesh, mesh
     faults
 }
 
-/// Probes with points on faces across which B jumps, where that of one side is measured, and beside edges.
-pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
+/// Probes with points on faces across which B jumps, where that of one side is measured, and beside edges; both meshes as in
+/// [`faults`].
+pub(super) fn warnings(config: &Config, full_mesh: &Mesh, mesh: &Mesh) -> Vec<String> {
     if config.probes.is_empty() {
         return Vec::new();
     }
@@ -58,7 +58,7 @@ pub(super) fn warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
         around[i].push(e);
     }
     let mut around = &around[..];
-    let edges = Edges::of(config, mesh);
+    let edges = Edges::of(config, full_mesh, mesh);
     let mut warnings = Vec::new();
     for probe in &config.probes {
         let (own, others) = around.split_at(probe.points.len());
@@ -101,11 +101,12 @@ fn and_more(count: usize, how: &str) -> String {
     }
 }
 
-/// Edges of iron and of magnets.
+/// Edges of iron, of magnets and of conductors that their surfaces replace.
 ///
 /// Towards an edge of 270° of air B grows with the distance d as d^(−1/3) (Jackson, Classical Electrodynamics, 2.11); recovered in
 /// elements of size h it has what it has at h/2, in both orders that an estimate compares.
 struct Edges<'a> {
+    /// Without what is replaced.
     mesh: &'a Mesh,
     ends: Vec<[Point; 2]>,
     tree: BoxTree,
@@ -114,8 +115,8 @@ struct Edges<'a> {
 }
 
 impl<'a> Edges<'a> {
-    fn of(config: &Config, mesh: &'a Mesh) -> Self {
-        let ends = sharp_edges(config, mesh);
+    fn of(config: &Config, full_mesh: &Mesh, mesh: &'a Mesh) -> Self {
+        let ends = sharp_edges(config, full_mesh);
         let tree = BoxTree::new(ends.iter().map(AxisBox::around).collect());
         let order = if config.analysis.order == ElementOrder::Quadratic { 2.0 } else { 1.0 };
         Self { mesh, ends, tree, order }
@@ -144,9 +145,9 @@ impl<'a> Edges<'a> {
         // At the edge itself there is no number.
         let factor = (2.0 * share).max(1e-3).powf(-1.0 / 3.0);
         Some(format!(
-            "the point {}{} of the probe `{}` is {:.3} mm from an edge of iron or of a magnet, in elements of {:.3} mm: B grows \
-             without limit towards an edge, and is up to {factor:.1} times as large as what such elements have there, which no \
-             error bar counts; take smaller elements, or a point farther away",
+            "the point {}{} of the probe `{}` is {:.3} mm from an edge of iron, of a magnet or of a replaced conductor, in elements of \
+             {:.3} mm: B grows without limit towards an edge, and is up to {factor:.1} times as large as what such elements have \
+             there, which no error bar counts; take smaller elements, or a point farther away",
             millimetres(point),
             and_more(all.len(), " less so"),
             probe.name,
@@ -190,14 +191,18 @@ fn sharp_edges(config: &Config, mesh: &Mesh) -> Vec<[Point; 2]> {
     normals.into_keys().map(|edge| edge.map(|n| mesh.point(n))).collect()
 }
 
-/// Whether the part of B along a face jumps between two regions: permeabilities, curves or magnets differ.
+/// Whether the part of B along a face jumps between two regions: permeabilities, curves or magnets differ, or one alone is replaced by
+/// its surface.
 fn flux_density_jumps(config: &Config, region: &str, other: &str) -> bool {
     let own = |region: &str| {
+        if !config.is_meshed(region) {
+            return None;
+        }
         let entry = config.regions.get(region);
         let curve = entry
             .map(|own| &own.material)
             .filter(|name| config.materials.get(*name).is_some_and(|m| m.saturates()));
-        (material(config, region).relative_permeability, curve, entry.and_then(|own| own.remanence))
+        Some((material(config, region).relative_permeability, curve, entry.and_then(|own| own.remanence)))
     };
     own(region) != own(other)
 }

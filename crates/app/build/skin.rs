@@ -9,7 +9,7 @@ use fluxmorph_solver::Material;
 use fluxmorph_solver::audit::{SkinAudit, conductor_of, first_layer, skin_audit};
 
 use super::curves::Curves;
-use super::entries::material;
+use super::entries::{material, solid_coil};
 use super::field;
 use crate::config::{self, Config, Limit, RegionModel};
 
@@ -35,6 +35,8 @@ pub struct Audited {
     pub frequency: f64,
     /// Meshed, or replaced by its impedance surface.
     pub model: RegionModel,
+    /// The frequency [Hz] at which something speaks against the other one of these; `None` where nothing does at any.
+    pub other_fails_at: Option<f64>,
 }
 
 impl Audited {
@@ -65,11 +67,17 @@ impl Audited {
                     self.audit.thinness().unwrap_or_default()
                 )
             }),
+            (RegionModel::Volume, PermeabilityOf::Material) if self.other_fails_at.is_some() => {
+                coarse.map(|text| text.split(", or use model").next().unwrap_or_default().to_owned())
+            }
             (RegionModel::Volume, PermeabilityOf::Material) => coarse,
-            (RegionModel::Impedance, _) if coarse.is_some() => thin.map(|text| {
-                format!("{text} with thinner elements at its surface: these are too thick for the skin depth")
+            (RegionModel::Impedance, _) => thin.map(|text| match self.other_fails_at {
+                Some(at) => {
+                    let at = if at == self.frequency { String::new() } else { format!(" at {} Hz", Readable(at)) };
+                    format!("{text} with thinner elements at its surface: these are too thick for the skin depth{at}")
+                }
+                None => text,
             }),
-            (RegionModel::Impedance, _) => thin,
             (RegionModel::Perfect, _) => None,
         }
     }
@@ -82,11 +90,14 @@ fn finding(warning: &str) -> &str {
 
 /// The warnings of audits, one a region: of many frequencies and loads that of the worst.
 pub(crate) fn warnings<'a>(audits: impl IntoIterator<Item = &'a Audited>) -> Vec<String> {
+    worst_of_regions(audits.into_iter().filter_map(|audited| Some((audited, audited.warning()?))))
+}
+
+/// Of what is said of audits that of the worst frequency of each region.
+fn worst_of_regions<'a>(said: impl Iterator<Item = (&'a Audited, String)>) -> Vec<String> {
     let mut by_region: BTreeMap<&str, Vec<(&Audited, String)>> = BTreeMap::new();
-    for audited in audits {
-        if let Some(warning) = audited.warning() {
-            by_region.entry(&audited.audit.region).or_default().push((audited, warning));
-        }
+    for (audited, text) in said {
+        by_region.entry(&audited.audit.region).or_default().push((audited, text));
     }
     let worst = |of_region: Vec<(&Audited, String)>| {
         let frequencies: BTreeSet<u64> = of_region.iter().map(|(own, _)| own.frequency.to_bits()).collect();
@@ -95,11 +106,11 @@ pub(crate) fn warnings<'a>(audits: impl IntoIterator<Item = &'a Audited>) -> Vec
             RegionModel::Impedance => own.audit.skin_depth,
             RegionModel::Volume | RegionModel::Perfect => -own.audit.skin_depth,
         };
-        let (audited, warning) = of_region.into_iter().max_by(|a, b| badness(a).total_cmp(&badness(b)))?;
+        let (audited, text) = of_region.into_iter().max_by(|a, b| badness(a).total_cmp(&badness(b)))?;
         Some(match frequencies.len() {
-            1 => warning,
+            1 => text,
             count => {
-                format!("at {} Hz, the worst of {count} frequencies: {warning}", Readable(audited.frequency))
+                format!("at {} Hz, the worst of {count} frequencies: {text}", Readable(audited.frequency))
             }
         })
     };
@@ -120,14 +131,32 @@ pub(super) fn audits(config: &Config, mesh: &Mesh, curves: &Curves) -> Vec<Audit
         } else {
             (linear, PermeabilityOf::Material)
         };
-        let at = |&frequency: &f64| {
-            let audit = audit(config, mesh, &conductor, &material, frequency)?;
-            Some(Audited { audit, permeability_of, frequency, model: region.model })
+        let at = |&frequency: &f64| Some((frequency, audit(config, mesh, &conductor, &material, frequency)?));
+        let own: Vec<(f64, SkinAudit)> = frequencies.iter().filter_map(at).collect();
+        let other_fails_at = match region.model {
+            RegionModel::Volume if frequencies.contains(&0.0) => Some(0.0),
+            RegionModel::Volume if solid_coil(config, name).is_some() => frequencies.first().copied(),
+            RegionModel::Volume => first(&own, |audit| audit.thinness().is_some()),
+            RegionModel::Impedance | RegionModel::Perfect => {
+                first(&own, |audit| audit.volume_warning().is_some())
+            }
         };
-        Some(frequencies.iter().filter_map(at).collect::<Vec<_>>())
+        let audited = |(frequency, audit)| Audited {
+            audit,
+            permeability_of,
+            frequency,
+            model: region.model,
+            other_fails_at,
+        };
+        Some(own.into_iter().map(audited).collect::<Vec<_>>())
     };
     let has_skin = |(_, region): &(&String, &config::Region)| region.model != RegionModel::Perfect;
     config.regions.iter().filter(has_skin).filter_map(of).flatten().collect()
+}
+
+/// The frequency [Hz] of the first audit that is so.
+fn first(audits: &[(f64, SkinAudit)], is_so: impl Fn(&SkinAudit) -> bool) -> Option<f64> {
+    audits.iter().find(|(_, audit)| is_so(audit)).map(|(frequency, _)| *frequency)
 }
 
 /// An audit of iron with a B–H curve in the mesh and the field of an analysis, which leaves the elements of its first layer, with the
@@ -185,8 +214,8 @@ pub(super) fn bound_warnings(
     let at = usize::from(least[1] < least[0]);
     let (key, p) = bounds[at];
     let sound = audits.iter().filter(|audited| audited.warning().is_none());
-    let thin = sound.filter_map(|own| wall_warning(own, &left[at]));
-    let mut warnings: Vec<String> = thin
+    let mut warnings: Vec<String> = wall_warnings(sound, &left[at])
+        .into_iter()
         .map(|text| {
             format!(
                 "at {key} {text}. Take a bound nearer to zero, or a constraint of kind = \"thickness\" with a minimum"
@@ -215,7 +244,7 @@ pub(crate) fn result_warnings(
     let sound = audits.iter().filter(|audited| audited.warning().is_none());
     // What iron with a B–H curve has is said of its field.
     let linear = audits.iter().filter(|own| own.permeability_of == PermeabilityOf::Material);
-    sound.filter_map(|own| wall_warning(own, thinnest)).chain(new_objections(config, linear, mesh)).collect()
+    [wall_warnings(sound, thinnest), new_objections(config, linear, mesh)].concat()
 }
 
 /// Objections to meshed conductors of a moved mesh to which there was none at the start.
@@ -224,25 +253,37 @@ fn new_objections<'a>(
     audits: impl Iterator<Item = &'a Audited>,
     mesh: &Mesh,
 ) -> Vec<String> {
-    let is_looked_at = |own: &&Audited| own.model == RegionModel::Volume && own.warning().is_none();
     let again = |then: &Audited| {
         let name = &then.audit.region;
         let relative_permeability = then.audit.relative_permeability;
         let material = Material { relative_permeability, ..material(config, name) };
         let audit = audit(config, mesh, &conductor(config, mesh, name)?, &material, then.frequency)?;
-        Some(Audited { audit, ..*then })
+        Some((then.warning().is_none(), Audited { audit, ..*then }))
     };
-    let moved: Vec<Audited> = audits.filter(is_looked_at).filter_map(again).collect();
+    let moved: Vec<(bool, Audited)> =
+        audits.filter(|own| own.model == RegionModel::Volume).filter_map(again).collect();
+    let now_thin = |own: &Audited| {
+        let is_thin =
+            |other: &&Audited| other.audit.region == own.audit.region && other.audit.thinness().is_some();
+        moved.iter().map(|(_, other)| other).find(is_thin).map(|other| other.frequency)
+    };
+    let fails: Vec<Option<f64>> =
+        moved.iter().map(|(_, own)| own.other_fails_at.or_else(|| now_thin(own))).collect();
+    let sound = moved.into_iter().zip(fails).filter(|((was_sound, _), _)| *was_sound);
+    let moved: Vec<Audited> =
+        sound.map(|((_, own), other_fails_at)| Audited { other_fails_at, ..own }).collect();
     warnings(&moved)
 }
 
 /// The least thickness [m] of every designed body, by the names of their regions.
 pub(crate) type LeastThickness = BTreeMap<String, f64>;
 
-/// What an impedance surface assumes in vain of the wall that it stands for.
-fn wall_warning(audited: &Audited, least: &LeastThickness) -> Option<String> {
-    let thickness = *least.get(&audited.audit.region)?;
-    (audited.model == RegionModel::Impedance).then(|| audited.audit.wall_warning(thickness)).flatten()
+/// What impedance surfaces assume in vain of the walls that they stand for.
+fn wall_warnings<'a>(audits: impl Iterator<Item = &'a Audited>, least: &LeastThickness) -> Vec<String> {
+    worst_of_regions(audits.filter(|own| own.model == RegionModel::Impedance).filter_map(|own| {
+        let thickness = *least.get(&own.audit.region)?;
+        Some((own, own.audit.wall_warning(thickness)?))
+    }))
 }
 
 /// The least thickness [m] of the designed bodies where every node is at `place` [m].

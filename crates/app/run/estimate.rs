@@ -26,8 +26,9 @@ use crate::show::Observer;
 /// 73 thousand tetrahedra: 8.9 to 10.8 kB without ψ and 26 to 30 more with it, and 8.7 to 8.9 and 15 to 21 of nodal elements.
 const ESTIMATE_BYTES: [[usize; 2]; 2] = [[9_200, 29_000], [8_700, 20_000]];
 
-/// What Newton's method adds for each tetrahedron along a B–H curve: the matrix of the tangent beside that of the linear parts.
-const TANGENT_BYTES_PER_TET: usize = 3_900;
+/// What Newton's method adds for each tetrahedron along a B–H curve, at 0 Hz and above: the matrix of the tangent beside that of the
+/// linear parts, and the vectors of GMRES.
+const TANGENT_BYTES_PER_TET: [usize; 2] = [3_900, 6_700];
 
 /// Error of second order over what halved edges change.
 const OF_HALVED_EDGES: f64 = 4.0 / 3.0;
@@ -52,8 +53,9 @@ pub(crate) fn memory(config: &Config, problem: &Problem) -> Option<usize> {
         return None;
     }
     let sizes = Sizes::of(problem);
-    let has_curve = problem.states().iter().any(|state| !state.is_linear());
-    let tangent = if has_curve { TANGENT_BYTES_PER_TET } else { 0 };
+    let along_curves = problem.states().iter().filter(|state| !state.is_linear());
+    let of_state = |state: &FieldModel| TANGENT_BYTES_PER_TET[usize::from(state.angular_frequency() > 0.0)];
+    let tangent = along_curves.map(of_state).max().unwrap_or_default();
     let [edge, nodal] = ESTIMATE_BYTES.map(|[all, eddy]| [all + tangent, eddy]);
     Some(match config.analysis.elements {
         _ if config.analysis.order == ElementOrder::Quadratic => sizes.on_other_mesh(8.0)[0],

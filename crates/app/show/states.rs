@@ -5,7 +5,8 @@ use std::collections::BTreeMap;
 use fluxmorph_optimizer::body::BodyForce;
 
 use crate::files::{
-    CoilResult, MultipoleResult, ProbeResult, RunResult, SaturationResult, StateErrors, StateResult,
+    Amplitude, CoilResult, MultipoleResult, ProbeResult, RunResult, SaturationResult, StateErrors,
+    StateResult,
 };
 
 /// A state: a load, or a frequency.
@@ -64,5 +65,13 @@ impl<'a> State<'a> {
             probes: &state.probes,
             errors: state.errors.as_ref(),
         }
+    }
+}
+
+/// What is said behind values of a coil: that those of a phasor are peaks.
+pub(super) fn peaks(amplitude: Amplitude) -> &'static str {
+    match amplitude {
+        Amplitude::Static(_) => "",
+        Amplitude::Phasor(_) => ", peak values",
     }
 }

@@ -2,7 +2,7 @@
 
 use fluxmorph_optimizer::body::BodyForce;
 
-use super::states::State;
+use super::states::{State, peaks};
 use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, each_once};
@@ -152,7 +152,9 @@ fn saturated(region: &SaturatedRegion, at: &str) -> Row {
         None => String::new(),
     };
     let share = 100.0 * region.volume_share_beyond_knee;
-    let text = format!("{highest:.3} T in {}{at}{end}; {share:.1} % is beyond the knee", printable(name));
+    // Three decimals of a small value would be one digit, or none.
+    let highest = if *highest < 0.01 { format!("{highest:.3e}") } else { format!("{highest:.3}") };
+    let text = format!("{highest} T in {}{at}{end}; {share:.1} % is beyond the knee", printable(name));
     ("highest B", text)
 }
 
@@ -269,7 +271,7 @@ fn coil_text(coil: &CoilResult, errors: Option<&StateErrors>) -> String {
         Amplitude::Phasor([re, im]) => format!("({re:.6e} {im:+.6e}j)"),
     };
     format!(
-        "{}: {} A{}, {} Wb{}, {}{}, {} V",
+        "{}: {} A{}, {} Wb{}, {}{}, {} V{}",
         printable(&coil.name),
         text(coil.current_a),
         bar(errors.and_then(|errors| errors.currents_a.get(&coil.name)), "A"),
@@ -278,7 +280,8 @@ fn coil_text(coil: &CoilResult, errors: Option<&StateErrors>) -> String {
         coil.resistance_ohm
             .map_or_else(|| "no resistance at rest".to_owned(), |own| format!("{own:.6e} ohm")),
         bar(errors.and_then(|errors| errors.resistances_ohm.get(&coil.name)), "ohm"),
-        text(coil.voltage_v)
+        text(coil.voltage_v),
+        peaks(coil.voltage_v)
     )
 }
 

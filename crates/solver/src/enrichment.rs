@@ -19,16 +19,14 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::fem::scalar::axpy;
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
-use fluxmorph_geometry::{CarrierId, ElementId, Mesh, Readable};
+use fluxmorph_geometry::{CarrierId, ElementId, Mesh};
 
 use crate::circuit::Excitation;
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::linear::{LinearSolver, LinearSolverCache, LinearSolverSettings, Method, PreparedSystem, Reuse};
 use crate::model::FieldModel;
-use crate::nonlinear;
 use crate::prolongation::{ScalarSpace, injection, prolongation};
 use crate::setup::FieldModelSetup;
 use crate::solution::FieldSolution;
@@ -50,10 +48,15 @@ const MOST_EVALUATIONS: f64 = 6.0;
 /// Counted work that is affordable whatever an evaluation costs [ns]: ten seconds.
 const ALWAYS_AFFORDABLE: f64 = 1e10;
 
+/// Solutions with the nearest matrix that a step of Newton's method takes along a B–H curve above 0 Hz, in units of the longest of
+/// them: of a dozen most are rough.
+const SOLUTIONS_OF_A_STEP: f64 = 4.0;
+
 /// How much an estimate may cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Effort {
-    /// Iterations of as much work as six evaluations, or ten seconds.
+    /// Iterations of as much work as six evaluations of a linear state, or ten seconds; along a B–H curve for every step of Newton's
+    /// method.
     Affordable,
     /// As much as it takes.
     Any,
@@ -110,8 +113,8 @@ impl FieldModel {
     /// The same problem in second order on the undeformed mesh, to be solved roughly and with so much effort.
     ///
     /// # Errors
-    /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks, for a B–H curve with a
-    /// frequency, and for nodal elements at re-entrant edges of walls.
+    /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks, and for nodal elements at
+    /// re-entrant edges of walls.
     pub fn enriched(&self, mesh: &Mesh, effort: Effort) -> Result<Self, SolverError> {
         let refuse = |what: &str, value: &str, expected: &str| SolverError::Parameter {
             what: what.to_owned(),
@@ -120,14 +123,6 @@ impl FieldModel {
         };
         if self.setup().order != Order::Linear {
             return Err(refuse("order", "2", "first order: there is no third one to estimate an error from"));
-        }
-        if !self.is_linear() && self.angular_frequency() > 0.0 {
-            let frequency = format!("{} Hz", Readable(self.setup().frequency));
-            return Err(refuse(
-                "frequency",
-                &frequency,
-                "0 Hz beside a B–H curve, along which no error is estimated above it",
-            ));
         }
         if self.has_reentrant_walls() {
             return Err(refuse(
@@ -142,7 +137,9 @@ impl FieldModel {
         let most_work = match (effort, self.linear_solver()) {
             // Half for each of the two corrections.
             (Effort::Affordable, Some(own)) => {
-                0.5 * (MOST_EVALUATIONS * own.work_of(2)?).max(ALWAYS_AFFORDABLE)
+                let is_iterated = !self.is_linear() && self.angular_frequency() > 0.0;
+                let solutions = if is_iterated { SOLUTIONS_OF_A_STEP } else { 1.0 };
+                0.5 * (MOST_EVALUATIONS * own.work_of(2)?).max(ALWAYS_AFFORDABLE) / solutions
             }
             _ => f64::INFINITY,
         };
@@ -187,24 +184,22 @@ impl Corrected {
     /// With B–H curves: the second-order state itself, as far as a thousandth of the load, and the tangent there. One step from the
     /// first-order field is none of it where iron is saturated: beyond the knee it overshoots, and what is left of the residual is
     /// no small part.
-    fn by_newton(model: &FieldModel, mesh: &Mesh, field: &[c64]) -> Result<Self, SolverError> {
-        let matrix = model.assemble(mesh);
-        let residual_of = |values: &[c64]| {
-            let (mut residual, mut product) = (model.load(mesh), vec![c64::default(); values.len()]);
-            matrix.mul(values, &mut product);
-            let added = nonlinear::added(model, mesh, &FieldSolution::of_state(values.to_vec()));
-            axpy(c64::from(-1.0), &product, &mut residual);
-            axpy(c64::from(-1.0), &added.residual, &mut residual);
-            residual
-        };
-        let from = (&mut LinearSolverCache::default(), Some(field));
+    fn by_newton(
+        model: &FieldModel,
+        mesh: &Mesh,
+        (field, currents): (&[c64], &[c64]),
+    ) -> Result<Self, SolverError> {
+        let first = [field, currents].concat();
+        let from = (&mut LinearSolverCache::default(), Some(&first[..]));
         let (state, system) = model.solve_nonlinear(mesh, from, &mut |_| {})?;
+        let residual_of = model.nonlinear_residuals(mesh);
+        let less = |u: &[c64], first: &[c64]| u.iter().zip(first).map(|(u, first)| u - first).collect();
         Ok(Self {
             system,
-            residual: residual_of(field),
-            rest: residual_of(state.values()),
-            correction: state.values().iter().zip(field).map(|(u, first)| u - first).collect(),
-            driven: Vec::new(),
+            rest: residual_of(state.unknowns()),
+            correction: less(state.values(), field),
+            driven: less(state.currents(), currents),
+            residual: residual_of(first),
             iterations: state.report().iterations,
         })
     }
@@ -234,7 +229,7 @@ impl Enrichment {
         let Corrected { system, residual, rest, correction, driven, iterations } = if model.is_linear() {
             Corrected::in_one_step(&model, mesh, (&field, &currents), shared)?
         } else {
-            Corrected::by_newton(&model, mesh, &field)?
+            Corrected::by_newton(&model, mesh, (&field, &currents))?
         };
         Ok(Self {
             model,

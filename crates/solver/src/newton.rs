@@ -92,7 +92,11 @@ struct Energy<'a> {
     load: Vec<c64>,
 }
 
-impl Energy<'_> {
+impl<'a> Energy<'a> {
+    fn new(model: &'a FieldModel, mesh: &'a Mesh) -> Self {
+        Self { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) }
+    }
+
     /// Energy and residual of some unknowns.
     fn at(&self, values: Vec<c64>) -> Iterate {
         let mut residual = vec![c64::default(); values.len()];
@@ -156,6 +160,12 @@ impl Energy<'_> {
     }
 }
 
+/// What unknowns leave of the load less all that they take of it.
+pub(crate) fn residuals<'a>(model: &'a FieldModel, mesh: &'a Mesh) -> impl Fn(Vec<c64>) -> Vec<c64> + 'a {
+    let energy = Energy::new(model, mesh);
+    move |values| energy.at(values).residual.iter().map(|r| -r).collect()
+}
+
 /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the adjoint.
 ///
 /// # Errors
@@ -166,7 +176,7 @@ pub(crate) fn solve(
     (systems, start): (&mut StepSystems<'_>, Option<&[c64]>),
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
-    let problem = Energy { model, mesh, matrix: model.assemble(mesh), load: model.load(mesh) };
+    let problem = Energy::new(model, mesh);
     let scale = norm(&problem.load);
     let mut descent = Descent::new(model.setup().linear_solver.tolerance);
     let (mut iterate, mut iterations, mut steps) = match start {

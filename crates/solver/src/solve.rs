@@ -56,6 +56,18 @@ impl FieldModel {
         }
     }
 
+    /// What [`unknowns`](FieldSolution::unknowns) leave of the field's equations with B–H laws: the load less all that they take of it.
+    pub(crate) fn nonlinear_residuals<'a>(
+        &'a self,
+        mesh: &'a Mesh,
+    ) -> Box<dyn Fn(Vec<c64>) -> Vec<c64> + 'a> {
+        if self.angular_frequency() > 0.0 {
+            Box::new(newton_harmonic::residuals(self, mesh))
+        } else {
+            Box::new(newton::residuals(self, mesh))
+        }
+    }
+
     /// Solves the state problem with a prepared system and a load.
     ///
     /// # Errors

@@ -2,12 +2,11 @@
 
 use fluxmorph_geometry::Topology;
 
-use super::super::entries::{density, material};
+use super::super::entries::{density, material, solid_coil};
 use super::super::multipole;
 use super::super::references::functionals;
 use crate::config::{
-    self, ABOVE_ZERO_HERTZ, Coil, CoilShape, Config, Diagnostic, LoadCase, ObjectiveKind, RegionModel,
-    SourceMap,
+    self, ABOVE_ZERO_HERTZ, Coil, Config, Diagnostic, LoadCase, ObjectiveKind, RegionModel, SourceMap,
 };
 
 /// What objective and constraints ask of regions that these cannot give.
@@ -48,8 +47,7 @@ fn direct_loss_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
     let losses = functionals(config).into_iter().filter(|(_, f)| f.kind == ObjectiveKind::Loss);
     let fault = |(path, functional): (String, &config::Functional)| {
         let region = functional.region.as_deref()?;
-        let is_own = |coil: &&config::Coil| matches!(&coil.shape, CoilShape::Region(own) if coil.is_solid() && own.region == region);
-        let coil = config.coils.iter().find(is_own)?;
+        let coil = solid_coil(config, region)?;
         let cases = config.load_cases();
         let is_direct = |case: &&LoadCase<'_>| {
             functional.is_taken_under(case) && case.frequency == 0.0 && case.feed(coil).amplitude != 0.0

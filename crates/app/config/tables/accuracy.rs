@@ -35,8 +35,8 @@ table! {
         /// expansions and probes: by `solve`, and by `run` at the first and the best design, unless `output.verify_refinement` is 0. In
         /// one process. Default: an estimate is made for elements of first order, and given up where its iterations would cost more
         /// than six evaluations and more than ten seconds for each state (along a B–H curve: than each step of Newton's method
-        /// may); to set up its system of second order takes its time beside that. `true`: it is made whatever it costs, and for
-        /// elements of second order too, on eight times as many. With B–H curves there is one at 0 Hz alone.
+        /// may); to set up its system of second order takes its time beside that. `true`: it is made whatever it costs, with up to
+        /// 3000 iterations for each solution, and for elements of second order too, on eight times as many.
         estimate: Option<bool> = FLAG;
         /// `run`: largest error bar of the objective that the mesh may make: at the initial design relative to the objective there,
         /// at the best one relative to the larger of both. With first order, in one process. Default: the mesh stays what it is,

@@ -5,7 +5,7 @@ use maud::{Markup, html};
 use super::tables::{ERROR_BAR, MOST_ROWS, bar, behind_title, of_first_state, titled_table};
 use super::ticks::number;
 use crate::files::{Amplitude, CoilResult, RunResult};
-use crate::show::states::State;
+use crate::show::states::{State, peaks};
 
 /// Terminals, inductances and coupling of coils; terms of expansions. Of several states all but the inductances for each.
 pub(super) fn circuits(result: &RunResult, states: &[State<'_>]) -> Markup {
@@ -37,7 +37,8 @@ fn terminals(state: &State<'_>) -> Markup {
     };
     let rows: Vec<Vec<String>> = state.coils.iter().map(row).collect();
     let head = ["coil", "current", "flux linkage", ERROR_BAR, "resistance", "voltage"];
-    titled_table(&format!("Coils of the meshed part{}", behind_title(state)), &head, &rows, MOST_ROWS)
+    let peaks = state.coils.first().map_or("", |coil| peaks(coil.voltage_v));
+    titled_table(&format!("Coils of the meshed part{}{peaks}", behind_title(state)), &head, &rows, MOST_ROWS)
 }
 
 /// The terms of expansions.

@@ -422,13 +422,14 @@ impl<'a, F: FnMut(&[f64]) -> Result<Sample, E>, E: From<Error>> Bridge<'a, F, E>
             return;
         };
         let (level, unit) = (x[variables..].iter().sum::<f64>(), self.level.map_or(0.0, |level| level.unit));
-        let own = sample.constraints.iter().map(|of| (of, 0.0));
-        let all = own.chain(sample.members.iter().map(|of| (of, unit))).zip(&self.factors.constraints);
-        for (value, (((own, _), unit), factor)) in values.iter_mut().zip(all.clone()) {
+        let own = sample.constraints.iter().map(|of| (scaling.shown(of), &of.1, 0.0));
+        let members = sample.members.iter().map(|(value, own)| (*value, own, unit));
+        let all = own.chain(members).zip(&self.factors.constraints);
+        for (value, ((own, _, unit), factor)) in values.iter_mut().zip(all.clone()) {
             *value = factor * (own - unit * level);
         }
         let Some(gradients) = gradients else { return };
-        for (row, (((_, own), unit), factor)) in gradients.chunks_exact_mut(x.len()).zip(all) {
+        for (row, ((_, own, unit), factor)) in gradients.chunks_exact_mut(x.len()).zip(all) {
             scaling.fill(row, *factor, own);
             row[variables..].fill(-factor * unit);
         }

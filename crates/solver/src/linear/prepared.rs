@@ -12,6 +12,9 @@ use super::system::{Goal, LocalSystem, SolverEvent};
 use crate::circuit::{Border, Equations, Excitation, Windings};
 use crate::error::SolverError;
 
+/// Relative true residual [1] of a solution that serves as a preconditioner.
+const ROUGH: f64 = 0.1;
+
 /// The field's matrix ready to be solved with, wherever it is.
 #[derive(Debug)]
 pub(crate) enum FieldSystem {
@@ -113,8 +116,13 @@ impl PreparedSystem {
         goal: Goal,
         right_side: &[c64],
     ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        self.aimed(goal, |system| system.solve(right_side))
+    }
+
+    /// What is solved with a goal; the settings' is that of what follows.
+    fn aimed<T>(&mut self, goal: Goal, solve: impl FnOnce(&mut Self) -> T) -> T {
         self.field.aim(Some(goal));
-        let solved = self.solve(right_side);
+        let solved = solve(self);
         self.field.aim(None);
         solved
     }
@@ -204,6 +212,16 @@ impl PreparedSystem {
             system.forget_last();
         }
         Ok(solved)
+    }
+
+    /// The same, so far as a preconditioner has to go that another operator is iterated with; on several ranks as the settings say.
+    pub(crate) fn solve_roughly(
+        &mut self,
+        right_side: &[c64],
+    ) -> Result<(Vec<c64>, LinearSolverReport), SolverError> {
+        let FieldSystem::Local(system) = &self.field else { return self.solve_once(right_side) };
+        let goal = system.usual_goal().relaxed_to(ROUGH);
+        self.aimed(goal, |system| system.solve_once(right_side))
     }
 
     /// Solves with what excites the circuits; the currents [A] that flow in them too.

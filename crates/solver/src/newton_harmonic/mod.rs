@@ -133,7 +133,7 @@ impl HarmonicTangent {
         let mut inner = 0;
         let operator = &mut |x: &[c64]| Ok(self.apply(side, x, circuits.as_ref()));
         let preconditioner = &mut |r: &[c64]| {
-            let (z, report) = nearest.solve_once(r)?;
+            let (z, report) = nearest.solve_roughly(r)?;
             inner += report.iterations;
             Ok(z)
         };
@@ -378,6 +378,12 @@ impl<'a> Problem<'a> {
 /// `a + b`
 fn sum(a: &[c64], b: &[c64]) -> Vec<c64> {
     a.iter().zip(b).map(|(a, b)| a + b).collect()
+}
+
+/// What unknowns, those of circuits behind those of the field, leave in the rows of the field: the load less all that they take of it.
+pub(crate) fn residuals<'a>(model: &'a FieldModel, mesh: &'a Mesh) -> impl Fn(Vec<c64>) -> Vec<c64> + 'a {
+    let problem = Problem::new(model, mesh);
+    move |values| problem.at(values).residual.iter().map(|r| -r).collect()
 }
 
 /// Solves the state problem of a time-harmonic model with B–H laws; also returns the system with the derivative in that state,
