@@ -12,12 +12,11 @@ use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Derivatives, EnrichedModels, NoProgress, Problem, SolverCache};
 use fluxmorph_solver::enrichment::Effort;
 
-use crate::support::device::{BLOCK, SATURATED, written};
+use crate::support::device::{BLOCK, COILS, SATURATED, written};
 use crate::support::folder::{number, read_json};
 use crate::support::program::{command, finish, fluxmorph, folder};
 use crate::support::{changed, config, parsed, repository};
 
-const COILS: &str = include_str!("../support/coils.toml");
 const BUSBAR: &str = include_str!("../../configs/busbar.toml");
 
 /// A problem with an objective, as read.

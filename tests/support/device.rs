@@ -12,6 +12,9 @@ use super::{changed, repository};
 /// An iron block over a gap in a uniform field, whose lower face moves: a run takes milliseconds.
 pub(crate) const BLOCK: &str = include_str!("block.toml");
 
+/// Two circular coils over a plate.
+pub(crate) const COILS: &str = include_str!("coils.toml");
+
 /// A bound on the volume of the block.
 pub(crate) const CONSTRAINT: (&str, &str) =
     ("[design]", "[[constraints]]\nkind = \"volume\"\nregion = \"iron\"\nlower_ratio = 0.98\n\n[design]");

@@ -22,16 +22,22 @@ pub(crate) fn is_magnet(config: &Config, region: &str) -> bool {
     config.regions.get(region).is_some_and(|own| own.remanence.is_some())
 }
 
+/// The coils whose winding or conductor a region is.
+fn coils_of<'a>(config: &'a Config, region: &str) -> impl Iterator<Item = &'a Coil> {
+    config
+        .coils
+        .iter()
+        .filter(move |coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == region))
+}
+
 /// Whether a region is a coil.
 pub(crate) fn is_wound(config: &Config, region: &str) -> bool {
-    let of = |coil: &Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == region);
-    config.coils.iter().any(of)
+    coils_of(config, region).next().is_some()
 }
 
 /// The coil whose solid conductor a region is.
 pub(super) fn solid_coil<'a>(config: &'a Config, region: &str) -> Option<&'a Coil> {
-    let is_there = |coil: &&Coil| matches!(&coil.shape, CoilShape::Region(own) if own.region == region);
-    config.coils.iter().filter(|coil| coil.is_solid()).find(is_there)
+    coils_of(config, region).find(|coil| coil.is_solid())
 }
 
 /// Mass density [kg/m³] of a region's material, if it is given.

@@ -262,17 +262,14 @@ fn new_objections<'a>(
     };
     let moved: Vec<(bool, Audited)> =
         audits.filter(|own| own.model == RegionModel::Volume).filter_map(again).collect();
-    let now_thin = |own: &Audited| {
-        let is_thin =
-            |other: &&Audited| other.audit.region == own.audit.region && other.audit.thinness().is_some();
-        moved.iter().map(|(_, other)| other).find(is_thin).map(|other| other.frequency)
-    };
-    let fails: Vec<Option<f64>> =
-        moved.iter().map(|(_, own)| own.other_fails_at.or_else(|| now_thin(own))).collect();
-    let sound = moved.into_iter().zip(fails).filter(|((was_sound, _), _)| *was_sound);
-    let moved: Vec<Audited> =
-        sound.map(|((_, own), other_fails_at)| Audited { other_fails_at, ..own }).collect();
-    warnings(&moved)
+    let is_thin = |(_, own): &&(bool, Audited)| own.audit.thinness().is_some();
+    let now_thin: BTreeMap<String, f64> =
+        moved.iter().filter(is_thin).map(|(_, own)| (own.audit.region.clone(), own.frequency)).collect();
+    let looked_at = moved.into_iter().filter(|(was_sound, _)| *was_sound).map(|(_, own)| Audited {
+        other_fails_at: own.other_fails_at.or(now_thin.get(&own.audit.region).copied()),
+        ..own
+    });
+    warnings(&looked_at.collect::<Vec<_>>())
 }
 
 /// The least thickness [m] of every designed body, by the names of their regions.

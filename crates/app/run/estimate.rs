@@ -28,7 +28,7 @@ const ESTIMATE_BYTES: [[usize; 2]; 2] = [[9_200, 29_000], [8_700, 20_000]];
 
 /// What Newton's method adds for each tetrahedron along a B–H curve, at 0 Hz and above: the matrix of the tangent beside that of the
 /// linear parts, and the vectors of GMRES.
-const TANGENT_BYTES_PER_TET: [usize; 2] = [3_900, 6_700];
+const TANGENT_BYTES_PER_TET: [usize; 2] = [3_900, 4_800];
 
 /// Error of second order over what halved edges change.
 const OF_HALVED_EDGES: f64 = 4.0 / 3.0;

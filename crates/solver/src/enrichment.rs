@@ -192,14 +192,14 @@ impl Corrected {
         let first = [field, currents].concat();
         let from = (&mut LinearSolverCache::default(), Some(&first[..]));
         let (state, system) = model.solve_nonlinear(mesh, from, &mut |_| {})?;
-        let residual_of = model.nonlinear_residuals(mesh);
         let less = |u: &[c64], first: &[c64]| u.iter().zip(first).map(|(u, first)| u - first).collect();
+        let [residual, rest] = model.nonlinear_residuals(mesh, [first, state.unknowns()]);
         Ok(Self {
             system,
-            rest: residual_of(state.unknowns()),
+            residual,
+            rest,
             correction: less(state.values(), field),
             driven: less(state.currents(), currents),
-            residual: residual_of(first),
             iterations: state.report().iterations,
         })
     }

@@ -160,10 +160,10 @@ impl<'a> Energy<'a> {
     }
 }
 
-/// What unknowns leave of the load less all that they take of it.
-pub(crate) fn residuals<'a>(model: &'a FieldModel, mesh: &'a Mesh) -> impl Fn(Vec<c64>) -> Vec<c64> + 'a {
+/// What states take of the load, less that load.
+pub(crate) fn residuals(model: &FieldModel, mesh: &Mesh, states: [Vec<c64>; 2]) -> [Vec<c64>; 2] {
     let energy = Energy::new(model, mesh);
-    move |values| energy.at(values).residual.iter().map(|r| -r).collect()
+    states.map(|values| energy.at(values).residual)
 }
 
 /// Solves the state problem of a model with B–H laws; also returns the system with the tangent in that state, for the adjoint.

@@ -56,16 +56,12 @@ impl FieldModel {
         }
     }
 
-    /// What [`unknowns`](FieldSolution::unknowns) leave of the field's equations with B–H laws: the load less all that they take of it.
-    pub(crate) fn nonlinear_residuals<'a>(
-        &'a self,
-        mesh: &'a Mesh,
-    ) -> Box<dyn Fn(Vec<c64>) -> Vec<c64> + 'a> {
-        if self.angular_frequency() > 0.0 {
-            Box::new(newton_harmonic::residuals(self, mesh))
-        } else {
-            Box::new(newton::residuals(self, mesh))
-        }
+    /// What two states' [`unknowns`](FieldSolution::unknowns) leave of the field's equations with B–H laws: the load less all that they
+    /// take of it.
+    pub(crate) fn nonlinear_residuals(&self, mesh: &Mesh, states: [Vec<c64>; 2]) -> [Vec<c64>; 2] {
+        let residuals =
+            if self.angular_frequency() > 0.0 { newton_harmonic::residuals } else { newton::residuals };
+        residuals(self, mesh, states).map(|own| own.iter().map(|r| -r).collect())
     }
 
     /// Solves the state problem with a prepared system and a load.

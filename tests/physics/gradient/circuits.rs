@@ -5,9 +5,9 @@ use fluxmorph_optimizer::problem::Problem;
 use fluxmorph_optimizer::verify::Settings;
 
 use super::{all_hold, all_hold_on, uneven};
+use crate::support::device::COILS;
 use crate::support::{changed, setup_of};
 
-const COILS: &str = include_str!("../../support/coils.toml");
 const BUSBAR: &str = include_str!("../../../configs/busbar.toml");
 
 /// A bound on a kind of one coil or a pair, whatever its value.

@@ -6,10 +6,9 @@ use fluxmorph_optimizer::verify::Settings;
 
 use super::{MESHED, all_hold, all_hold_on, uneven, wavy};
 use crate::problems::analysed;
+use crate::support::device::COILS;
 use crate::support::folder::read_text;
 use crate::support::{changed, repository, setup, setup_of};
-
-const COILS: &str = include_str!("../../support/coils.toml");
 
 /// The objective of that device.
 const COUPLING: &str = "goal = \"maximise\"\nkind = \"coupling\"\ncoils = [\"one\", \"two\"]\n";

@@ -159,17 +159,15 @@ impl Run<'_> {
         if let Some(initial) = &self.initial {
             return Ok(initial.clone());
         }
-        if objective == 0.0 && members.iter().any(|term| *term != 0.0) {
-            return Err(Error::Optimisation {
-                cause: "the worst term of the initial design is zero: one of the loads or frequencies has no field there, or nothing of \
-                        what is asked for, as there is no loss at 0 Hz; leave it out of the objective",
-            });
-        }
         if objective == 0.0 {
-            return Err(Error::Optimisation {
-                cause: "the objective of the initial design is zero: there is no field to change, its terms cancel, or it is the deviation \
-                        within a single element; check coils, regions, frequencies and weights",
-            });
+            let cause = if members.iter().any(|term| *term != 0.0) {
+                "the worst term of the initial design is zero: one of the loads or frequencies has no field there, or nothing of what is \
+                 asked for, as there is no loss at 0 Hz; leave it out of the objective"
+            } else {
+                "the objective of the initial design is zero: there is no field to change, its terms cancel, or it is the deviation \
+                 within a single element; check coils, regions, frequencies and weights"
+            };
+            return Err(Error::Optimisation { cause });
         }
         let constraints = self.problem.constraints().iter().zip(measured);
         let bounds = constraints.map(|(constraint, &value)| constraint.bound(value));

@@ -380,10 +380,10 @@ fn sum(a: &[c64], b: &[c64]) -> Vec<c64> {
     a.iter().zip(b).map(|(a, b)| a + b).collect()
 }
 
-/// What unknowns, those of circuits behind those of the field, leave in the rows of the field: the load less all that they take of it.
-pub(crate) fn residuals<'a>(model: &'a FieldModel, mesh: &'a Mesh) -> impl Fn(Vec<c64>) -> Vec<c64> + 'a {
+/// What states, with the unknowns of circuits behind those of the field, take of the load in the rows of the field, less that load.
+pub(crate) fn residuals(model: &FieldModel, mesh: &Mesh, states: [Vec<c64>; 2]) -> [Vec<c64>; 2] {
     let problem = Problem::new(model, mesh);
-    move |values| problem.at(values).residual.iter().map(|r| -r).collect()
+    states.map(|values| problem.at(values).residual)
 }
 
 /// Solves the state problem of a time-harmonic model with B–H laws; also returns the system with the derivative in that state,
