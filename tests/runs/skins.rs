@@ -79,6 +79,21 @@ fn a_control_grid_that_the_mesh_does_not_follow_is_asked_about() {
     assert!(!texts(&check(&["design.grid=[7, 13]"])["warnings"]).contains("design.grid"));
 }
 
+#[test]
+fn a_filter_that_reaches_no_neighbour_is_asked_about() {
+    let said = |radius: &str| {
+        let text = read_text(&quick());
+        let (before, after) = text.split_once("grid = [7, 13]").expect("its design");
+        let home = folder();
+        let config = home.path().join("filtered.toml");
+        std::fs::write(&config, format!("{before}filter_radius = \"{radius}\"{after}")).expect("written");
+        texts(&finish(&mut command(&[&"check", &config, &"--json"])).exits_with(0).json()["warnings"])
+    };
+    let blind = said("20 um");
+    assert!(blind.contains("design.filter_radius is 0.0200 mm, and no node of the surface"), "{blind}");
+    assert!(!said("20 mm").contains("filter_radius"));
+}
+
 /// An impedance surface has to be possible wherever the mesh is too coarse, and where it is not: the plate is 10 mm thick.
 #[test]
 fn a_model_is_advised_where_it_serves_all_frequencies() {

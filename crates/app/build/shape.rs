@@ -7,7 +7,7 @@ use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::{Point, add, area_vector, centroid, dot, norm};
 use fluxmorph_geometry::topology::{Facet, face_key};
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, millimetres};
-use fluxmorph_optimizer::design::{DesignSurface, GridSide};
+use fluxmorph_optimizer::design::{DesignSurface, GridSide, default_filter_radius};
 use fluxmorph_optimizer::geometric::{WallThickness, faces_with_bodies};
 use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup, Subregion};
@@ -72,6 +72,7 @@ pub(super) fn body(inputs: &Inputs<'_>, config: &Config, warnings: &mut Vec<Stri
         warnings.extend(sides.into_iter().filter_map(|side| fine_grid_warning(side, full_mesh, &triangles)));
         warnings.extend(idle_warning(&surface));
     }
+    warnings.extend(blind_filter_warning(&surface, full_mesh, &triangles));
     warnings.extend(super::design::asymmetry_warning(design, full_mesh, (&full_surface, &triangles)));
     warnings.extend(side_warning(config, design, full_mesh, full_surface.nodes()));
     warnings.extend(held_warning(inputs.remesh, mesh, &surface));
@@ -127,6 +128,19 @@ fn idle_warning(surface: &DesignSurface) -> Option<String> {
             "{idle} of {} design variables move no node: these points of design.grid lie beside the surface in the rectangle around \
              it, between its nodes or on a fixed rim, and change nothing",
             surface.variable_count()
+        )
+    })
+}
+
+/// A filter that sees no neighbour of any node.
+fn blind_filter_warning(surface: &DesignSurface, mesh: &Mesh, triangles: &[[NodeId; 3]]) -> Option<String> {
+    let radius = surface.filter_radius()?;
+    surface.rows().iter().all(|row| row.len() <= 1).then(|| {
+        format!(
+            "design.filter_radius is {:.4} mm, and no node of the surface has another one as near: nothing is smoothed, each node moves \
+             on its own, and what that gains may be lost on another mesh; by default it is {:.3} mm here",
+            Millimetres(radius),
+            Millimetres(default_filter_radius(mesh, triangles)),
         )
     })
 }

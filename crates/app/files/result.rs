@@ -178,7 +178,8 @@ pub struct Verification {
     pub refinement: f64,
     /// Its tetrahedra.
     pub tets: usize,
-    /// How far the best shape is there from that of the run; `None` where nodes are the variables, and on cut elements.
+    /// How far the best shape is there from that of the run, and of cut elements from what the control grid describes; `None` where
+    /// nodes are the variables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deviation: Option<ShapeDeviation>,
     /// The objective at the initial design there.

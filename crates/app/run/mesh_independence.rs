@@ -195,7 +195,8 @@ impl MeshIndependence<'_> {
         let Some(analyses) = finer.analyses(&meshes.solved, interrupted)? else {
             return Ok(Outcome::CutShort);
         };
-        Ok(Outcome::Found(verification(&finer.setup.problem, (VerificationMesh::Cut, parts), &analyses)?))
+        let found = verification(&finer.setup.problem, (VerificationMesh::Cut, parts), &analyses)?;
+        Ok(Outcome::Found(Verification { deviation: self.shapes.between_nodes(), ..found }))
     }
 
     /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape or costs too much.
@@ -277,19 +278,30 @@ fn verification(
     })
 }
 
-/// That the best shape on a fresh mesh is so far from that of the run that their ratios, which differ, may be those of two shapes.
+/// That the best shape is so far from what its control grid describes that another mesh has another one: on a fresh mesh, where the
+/// ratios of both differ, and on cut elements, which have the facets of the run.
 fn of_another_shape(found: &Verification, ratio: f64) -> Option<String> {
     let ShapeDeviation { distance_m, motion_m } = found.deviation?;
-    let is_another = distance_m > LARGEST_DEVIATION * motion_m
-        && (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs();
-    is_another.then(|| {
-        format!(
-            "F/F0 on the fresh mesh, {}, is that of another shape: up to {:.3} mm from that of the run, of {:.3} mm of motion, as the \
-             control grid is finer than the cells of the surface, or bends within them; a coarser grid or smaller cells have one shape",
-            show::ratio(found.ratio),
-            Millimetres(distance_m),
-            Millimetres(motion_m)
-        )
+    let differs = match found.mesh {
+        VerificationMesh::Fresh => (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs(),
+        VerificationMesh::Cut => true,
+    };
+    if distance_m <= LARGEST_DEVIATION * motion_m || !differs {
+        return None;
+    }
+    let off = format!("up to {:.3} mm from", Millimetres(distance_m));
+    let motion = format!("of {:.3} mm of motion", Millimetres(motion_m));
+    let why = "as the control grid is finer than the cells of the surface, or bends within them";
+    Some(match found.mesh {
+        VerificationMesh::Fresh => format!(
+            "F/F0 on the fresh mesh, {}, is that of another shape: {off} that of the run, {motion}, {why}; a coarser grid or smaller \
+             cells have one shape",
+            show::ratio(found.ratio)
+        ),
+        VerificationMesh::Cut => format!(
+            "the best shape is {off} the surface that design.grid describes, {motion}, {why}: the cut elements have the facets of the \
+             run, and on another mesh the same variables have another shape and another F/F0; a coarser grid or smaller cells have one"
+        ),
     })
 }
 

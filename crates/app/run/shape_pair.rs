@@ -27,6 +27,8 @@ pub struct Change {
     surface: Triangulation,
     /// Displacements of its nodes [m], each of shape `(n_nodes, 3)`.
     displacements: [Vec<Point>; 2],
+    /// How far the best shape is from what a control grid describes.
+    between_nodes: Option<ShapeDeviation>,
 }
 
 impl ShapePair {
@@ -44,12 +46,26 @@ impl ShapePair {
         if best == shape.initial() {
             return Ok(Self::Unchanged);
         }
+        let surface = design_triangulation(design, &setup.full_mesh)?;
         let pair = [shape.initial(), best];
+        let displacements = pair.map(|p| shape.displacement(p));
+        let off = shape.surface().distance_from_facets(&surface, best);
+        let between_nodes = off.map(|distance_m| ShapeDeviation {
+            distance_m,
+            motion_m: longest(displacements[1].iter().copied()),
+        });
         Ok(Self::Changed(Box::new(Change {
             variables: design.grid.is_some().then(|| pair.map(<[f64]>::to_vec)),
-            surface: design_triangulation(design, &setup.full_mesh)?,
-            displacements: pair.map(|p| shape.displacement(p)),
+            surface,
+            displacements,
+            between_nodes,
         })))
+    }
+
+    /// How far the facets of the best shape are from the surface that a control grid describes; `None` without one.
+    pub(super) fn between_nodes(&self) -> Option<ShapeDeviation> {
+        let Self::Changed(change) = self else { return None };
+        change.between_nodes
     }
 
     /// Both shapes on another mesh of the same configuration.
@@ -87,9 +103,13 @@ pub(super) struct ShapesOnMesh {
 
 /// How far displacements of nodes are from those of a surface that the same control grid moves.
 fn deviation(old: &[Point], fresh: &[Point]) -> ShapeDeviation {
-    let longest = |vectors: &mut dyn Iterator<Item = Point>| vectors.map(norm).fold(0.0, f64::max);
     ShapeDeviation {
-        distance_m: longest(&mut old.iter().zip(fresh).map(|(&a, &b)| sub(a, b))),
-        motion_m: longest(&mut fresh.iter().copied()),
+        distance_m: longest(old.iter().zip(fresh).map(|(&a, &b)| sub(a, b))),
+        motion_m: longest(fresh.iter().copied()),
     }
+}
+
+/// The length of the longest vector [its unit].
+fn longest(vectors: impl Iterator<Item = Point>) -> f64 {
+    vectors.map(norm).fold(0.0, f64::max)
 }

@@ -144,6 +144,14 @@ impl Constraint {
         Ok(Bound { value, slope: sign / scale })
     }
 
+    /// What a share beyond the bound is one of, in words: where that is zero, as [`Bound::excess`].
+    pub fn excess_is_of(&self) -> &'static str {
+        match self.limit {
+            Limit::AtMost(0.0) | Limit::AtLeast(0.0) => "of the initial value",
+            _ => "of it",
+        }
+    }
+
     /// What is to be said of a bound that is far from the value of the initial design, on its other side or in size.
     pub fn far_bound(&self, initial: f64) -> Option<String> {
         let (Limit::AtMost(value) | Limit::AtLeast(value)) = self.limit else { return None };

@@ -154,7 +154,8 @@ impl FieldModel {
             reuse: Reuse::Never,
             ..self.setup().linear_solver
         };
-        Self::new(mesh, FieldModelSetup { order: Order::Quadratic, linear_solver, ..self.setup().clone() })
+        let setup = FieldModelSetup { order: Order::Quadratic, linear_solver, ..self.setup().clone() };
+        Self::with_sources(mesh, setup, Some(self))
     }
 }
 

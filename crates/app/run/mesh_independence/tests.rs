@@ -124,14 +124,18 @@ fn a_smooth_shape_on_nodes_keeps_its_value_on_a_finer_surface() {
     assert!(grid < 0.99, "the shape changes the field: {grid}");
 }
 
+/// Every second point of the grid up and the others down, half as far.
+fn peaks() -> Vec<f64> {
+    (0..91).map(|k| if k % 2 == 0 { 8e-3 } else { -4e-3 }).collect()
+}
+
 /// Peaks of a grid twice as fine as the cells: what lies between nodes of the run's mesh is there on the fresh one alone.
 #[test]
 fn a_grid_that_is_finer_than_the_cells_has_another_shape_on_a_fresh_mesh() {
     let (mut config, source) = quick(false);
     config.output.verify_refinement = 2.0;
     let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
-    let peaks: Vec<f64> = (0..91).map(|k| if k % 2 == 0 { 8e-3 } else { -4e-3 }).collect();
-    for (best, is_another) in [(peaks, true), (dished(&setup), false)] {
+    for (best, is_another) in [(peaks(), true), (dished(&setup), false)] {
         let shapes = ShapePair::of(&config, &setup, &best).expect("a design surface");
         let (objective, recorded) =
             verified(&config, &source, &shapes, StopReason::ObjectiveConverged, false);
@@ -140,6 +144,25 @@ fn a_grid_that_is_finer_than_the_cells_has_another_shape_on_a_fresh_mesh() {
         println!("F/F0 {}: up to {distance_m} of {motion_m} m", found.ratio);
         assert_eq!(distance_m > 0.25 * motion_m, is_another, "{distance_m} {motion_m}");
         assert_eq!(recorded.notices.iter().any(|notice| notice.contains("another shape")), is_another);
+    }
+}
+
+/// Cut elements have the facets of the run, and their ratio says nothing of what lies between the nodes.
+#[test]
+fn what_a_grid_describes_between_the_nodes_is_said_to_be_on_no_cut_element() {
+    let (config, source) = quick(false);
+    let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
+    for (best, is_another) in [(peaks(), true), (dished(&setup), false)] {
+        let shapes = ShapePair::of(&config, &setup, &best).expect("a design surface");
+        let deviation = shapes.between_nodes();
+        let ShapeDeviation { distance_m, motion_m } = deviation.expect("a control grid");
+        println!("up to {distance_m} of {motion_m} m");
+        let (mesh, constraints) = (VerificationMesh::Cut, Vec::new());
+        let [initial, best, ratio] = [1.0, 0.5, 0.5];
+        let found =
+            Verification { mesh, refinement: 2.0, tets: 1, deviation, initial, best, ratio, constraints };
+        let notice = of_another_shape(&found, ratio);
+        assert_eq!(notice.is_some_and(|text| text.contains("that design.grid describes")), is_another);
     }
 }
 

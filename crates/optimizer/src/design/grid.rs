@@ -44,6 +44,7 @@ impl GridSide {
 }
 
 /// A regular grid over two coordinates.
+#[derive(Clone, Debug)]
 pub(super) struct Grid {
     along: usize,
     /// The two coordinates, the slow one first.
@@ -151,5 +152,36 @@ impl Grid {
                 point
             })
             .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{build, moved_block, outward};
+    use super::super::{Control, DesignSetup, Direction, Mirror, Triangulation};
+    use super::*;
+
+    /// Two triangles, whose common edge is a diagonal: a bilinear height is off them by a quarter of its twist in the middle, and a peak
+    /// there by all of it.
+    #[test]
+    fn a_surface_is_as_far_from_its_facets_as_it_bends_within_them() {
+        let mesh = moved_block(1, |x| x);
+        let faces = outward(&mesh, "z_max");
+        let facets = Triangulation::new(&mesh, &faces);
+        let off = |control: Control, mirrors: Vec<Mirror>, of: &dyn Fn(Point) -> f64| {
+            let base = DesignSetup::new(&faces, Direction::Along([0.0, 0.0, 1.0]));
+            let surface = build(&mesh, &DesignSetup { control, mirrors, ..base });
+            let p: Vec<f64> = surface.points().iter().map(|&x| of(x)).collect();
+            surface.distance_from_facets(&facets, &p)
+        };
+        let peak = |x: Point| if (x[0], x[1]) == (0.5, 0.5) { 2.0 } else { 0.0 };
+        let (square, nine) = (Control::Grid([2, 2]), Control::Grid([3, 3]));
+        let found = |distance: Option<f64>| distance.expect("a grid");
+        assert!(found(off(square, Vec::new(), &|x| 3.0 * x[0] - x[1])) < 1e-15);
+        assert!((found(off(square, Vec::new(), &|x| x[0] * x[1])) - 0.25).abs() < 1e-15);
+        for mirrors in [Vec::new(), vec![Mirror { axis: 0, at: 0.5 }]] {
+            assert!((found(off(nine, mirrors, &peak)) - 2.0).abs() < 1e-15);
+        }
+        assert_eq!(off(Control::Nodes, Vec::new(), &peak), None);
     }
 }

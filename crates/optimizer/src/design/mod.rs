@@ -175,6 +175,29 @@ fn axis_name(axis: usize) -> char {
     ['x', 'y', 'z'][axis]
 }
 
+/// A control grid with the variables of its points.
+#[derive(Clone, Debug)]
+struct ControlGrid {
+    cells: grid::Grid,
+    groups: symmetry::Groups,
+}
+
+impl ControlGrid {
+    /// What the grid describes at a place [m].
+    fn height(&self, place: Point, p: &[f64]) -> f64 {
+        self.cells.row(place).into_iter().map(|(k, weight)| weight * p[self.groups.variable(k)]).sum()
+    }
+}
+
+/// Parts of each edge of a facet between whose ends a grid is looked at.
+const PARTS: usize = 6;
+
+/// Barycentric coordinates of points of a triangle, evenly over it.
+fn lattice() -> impl Iterator<Item = [f64; 3]> {
+    let points = (0..=PARTS).flat_map(|i| (0..=PARTS - i).map(move |j| [i, j, PARTS - i - j]));
+    points.map(|counts| counts.map(|count| count as f64 / PARTS as f64))
+}
+
 /// The linear map from design variables to displacements of the design surface's nodes.
 #[derive(Clone, Debug)]
 pub struct DesignSurface {
@@ -186,7 +209,7 @@ pub struct DesignSurface {
     rows: Vec<Row>,
     points: Vec<Point>,
     filter_radius: Option<f64>,
-    grid_sides: Option<[GridSide; 2]>,
+    grid: Option<ControlGrid>,
 }
 
 impl DesignSurface {
@@ -219,7 +242,7 @@ impl DesignSurface {
         }
         let edges = boundary_edges::BoundaryEdges::new(&setup.triangles, &setup.cuts);
 
-        let mut grid_sides = None;
+        let mut grid = None;
         let (mut rows, mut points, groups) = match setup.control {
             Control::Nodes => {
                 let rows = (0..nodes.len()).map(|i| vec![(i, 1.0)]).collect();
@@ -232,12 +255,13 @@ impl DesignSurface {
                 (rows, places, symmetry::groups(nodes.len(), &pairs))
             }
             Control::Grid(counts) => {
-                let grid = grid::Grid::new(&places, &directions, counts)?;
-                let points = grid.points(&places);
-                let pairs = symmetry::pairs("control point", &grid.flat(&points), &setup.mirrors)?;
+                let cells = grid::Grid::new(&places, &directions, counts)?;
+                let points = cells.points(&places);
+                let pairs = symmetry::pairs("control point", &cells.flat(&points), &setup.mirrors)?;
                 let groups = symmetry::groups(points.len(), &pairs);
-                grid_sides = Some(grid.sides());
-                (places.iter().map(|&x| grid.row(x)).collect(), points, groups)
+                let rows = places.iter().map(|&x| cells.row(x)).collect();
+                grid = Some(ControlGrid { cells, groups: groups.clone() });
+                (rows, points, groups)
             }
         };
         groups.apply(&mut rows, &mut points);
@@ -251,7 +275,7 @@ impl DesignSurface {
             Control::Filter(radius) => Some(radius),
             Control::Nodes | Control::Grid(_) => None,
         };
-        let mut surface = Self { nodes, directions, mitres, rows, points, filter_radius, grid_sides };
+        let mut surface = Self { nodes, directions, mitres, rows, points, filter_radius, grid };
         if on_nodes {
             surface.drop_idle();
         }
@@ -311,7 +335,25 @@ impl DesignSurface {
 
     /// The sides of the control grid, where there is one; the first is slow in the order of the variables.
     pub fn grid_sides(&self) -> Option<[GridSide; 2]> {
-        self.grid_sides
+        Some(self.grid.as_ref()?.cells.sides())
+    }
+
+    /// How far the surface that a control grid describes with the variables `p` [m] is from the `facets` of the mesh at most, in the
+    /// directions of the nodes [m]: a grid bends within facets that are coarser than it is. Not looked at are facets with a node
+    /// that stays. `None` without a grid.
+    pub fn distance_from_facets(&self, facets: &Triangulation, p: &[f64]) -> Option<f64> {
+        let grid = self.grid.as_ref()?;
+        let heights = self.normal_displacements(p);
+        let distance = |triangle: &[usize; 3], weights: [f64; 3]| {
+            let mean = |of: &dyn Fn(usize) -> f64| {
+                triangle.iter().zip(weights).map(|(&i, weight)| weight * of(i)).sum::<f64>()
+            };
+            let place = std::array::from_fn(|d| mean(&|i| facets.places[i][d]));
+            (grid.height(place, p) - mean(&|i| heights[i])).abs()
+        };
+        let moving = facets.triangles.iter().filter(|t| t.iter().all(|&i| !self.rows[i].is_empty()));
+        let all = moving.flat_map(|triangle| lattice().map(move |weights| distance(triangle, weights)));
+        Some(all.fold(0.0, f64::max))
     }
 
     /// Where the variables sit on the undeformed surface [m], shape `(n_variables, 3)`.

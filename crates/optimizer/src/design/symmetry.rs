@@ -113,6 +113,7 @@ pub(super) fn mirror_numbers(numbers: &mut Vec<f64>, pairs: &[Vec<usize>]) {
 }
 
 /// The linear constraints of the variables: which old variable goes into which new one.
+#[derive(Clone, Debug)]
 pub(super) struct Groups {
     new_of: Vec<usize>,
     /// The first old variable of each new one.
@@ -135,6 +136,11 @@ pub(super) fn groups(count: usize, pairs: &[Vec<usize>]) -> Groups {
 }
 
 impl Groups {
+    /// The new variable that an old one goes into.
+    pub(super) fn variable(&self, old: usize) -> usize {
+        self.new_of[old]
+    }
+
     /// Renumbers the variables in the rows, adding up weights, and leaves each group the point of its first member.
     pub(super) fn apply(&self, rows: &mut [Row], points: &mut Vec<Point>) {
         if self.first.len() == self.new_of.len() {

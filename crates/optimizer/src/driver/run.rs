@@ -393,8 +393,9 @@ impl<'a> Run<'a> {
         let Some(best) = &self.best else { return Vec::new() };
         let violated = best.sample.constraints.iter().zip(self.problem.constraints());
         let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
-        let names: Vec<String> =
-            violated.map(|((excess, _), own)| format!("`{}` by {excess:.1e} of it", own.name)).collect();
+        let names: Vec<String> = violated
+            .map(|((excess, _), own)| format!("`{}` by {excess:.1e} {}", own.name, own.excess_is_of()))
+            .collect();
         let mut warnings = Vec::new();
         let promised = self.surely_promised();
         if let Some(promised) = promised.filter(|_| stop_reason == StopReason::ObjectiveConverged) {
@@ -414,12 +415,14 @@ impl<'a> Run<'a> {
         }
         if let Some(miss) = self.missed().filter(|_| best.violation == 0.0) {
             let (evaluation, objective, (k, excess)) = (miss.evaluation, miss.objective, miss.worst);
+            let constraint = &self.problem.constraints()[k];
             warnings.push(format!(
                 "evaluation {evaluation} has an objective of {objective:.6e}, against {:.6e} of the best design, and does not count: it is \
-                 beyond the bound of `{}` by {excess:.1e} of it, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
+                 beyond the bound of `{}` by {excess:.1e} {}, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
                  method of those that take constraints",
                 best.objective,
-                self.problem.constraints()[k].name
+                constraint.name,
+                constraint.excess_is_of()
             ));
         }
         warnings

@@ -92,14 +92,14 @@ impl Driven {
 }
 
 impl Windings {
-    /// Of the coils with a winding, in their order.
+    /// Of the coils with a winding, in their order; what makes their loads is that of `known` ones on the same mesh.
     ///
     /// # Errors
     /// As [`Sources::new`].
     pub(crate) fn new(
         mesh: &Mesh,
         coils: &[Coil],
-        windings: &[Option<Winding>],
+        (windings, known): (&[Option<Winding>], Option<&Self>),
         (space, unknowns, solids): (&Space, &Unknowns, &Solids),
     ) -> Result<Self, SolverError> {
         let of = |(coil, winding): (usize, &Option<Winding>)| -> Option<Result<Driven, SolverError>> {
@@ -107,14 +107,19 @@ impl Windings {
             let solid = solids.of_coil(coil);
             let unit = Coil { ampere_turns: c64::from(winding.turns), ..coils.get(coil)?.clone() };
             let unit = if solid.is_some() { Vec::new() } else { vec![unit] };
-            Some(Sources::new(mesh, &unit, &[]).map(|sources| {
+            let known = known.and_then(|known| known.coils.iter().find(|driven| driven.coil == coil));
+            let sources = match known {
+                Some(driven) => Ok(Arc::clone(&driven.sources)),
+                None => Sources::new(mesh, &unit, &[]).map(Arc::new),
+            };
+            Some(sources.map(|sources| {
                 let mut load = vec![c64::default(); unknowns.dofs.count()];
                 sources.add_load(space, unknowns, mesh, &mut load);
                 if let Some(segments) = &solid {
                     load.resize(load.len() + segments.start, c64::default());
                     load.resize(load.len() + segments.len(), c64::from(1.0));
                 }
-                Driven { coil, winding, solid, sources: Arc::new(sources), load: Arc::new(load) }
+                Driven { coil, winding, solid, sources, load: Arc::new(load) }
             }))
         };
         let coils = windings.iter().enumerate().filter_map(of).collect::<Result<_, _>>()?;

@@ -82,33 +82,36 @@ impl Racetrack {
                 return;
             }
             if self.in_round_corner(c) {
-                self.divide_curved(piece, 0, visit);
+                self.divide_curved(piece.map(|x| (x, self.distance(x))), 0, visit);
             } else {
                 visit(piece);
             }
         });
     }
 
-    /// Splits a piece of a round corner into eight as often as its curvature and kinks ask for.
-    fn divide_curved(&self, piece: [Point; 4], level: usize, visit: &mut impl FnMut([Point; 4])) {
-        let rho = piece.map(|x| self.distance(x));
+    /// Splits a piece of a round corner into eight as often as its curvature and kinks ask for; vertices come with their distance from
+    /// the window.
+    fn divide_curved(&self, piece: [(Point, f64); 4], level: usize, visit: &mut impl FnMut([Point; 4])) {
+        let (vertices, rho) = (piece.map(|vertex| vertex.0), piece.map(|vertex| vertex.1));
         let (least, greatest) =
             (rho.iter().copied().fold(f64::INFINITY, f64::min), rho.iter().copied().fold(f64::MIN, f64::max));
         // ρ is convex: a piece with its vertices in the window lies in the window, where T is constant.
         if greatest <= 0.0 {
-            return visit(piece);
+            return visit(vertices);
         }
         // ρ changes no faster than the place: a piece this far outside does not reach the winding.
-        let reach = (1..4).flat_map(|a| (0..a).map(move |b| (a, b)));
-        let diameter = reach.map(|(a, b)| norm(sub(piece[a], piece[b]))).fold(0.0, f64::max);
-        if greatest - diameter >= self.width {
+        if greatest >= self.width && greatest - diameter(vertices) >= self.width {
             return;
         }
         let kinked = (least < 0.0) || (least < self.width && greatest > self.width);
         if level >= if kinked { KINK_LEVELS } else { CORNER_LEVELS } {
-            return visit(piece);
+            return visit(vertices);
         }
-        for child in eighths(piece) {
+        let middle = |(a, _): (Point, f64), (b, _): (Point, f64)| {
+            let x = std::array::from_fn(|d| 0.5 * (a[d] + b[d]));
+            (x, self.distance(x))
+        };
+        for child in eighths(piece, middle) {
             self.divide_curved(child, level + 1, visit);
         }
     }
@@ -179,9 +182,15 @@ impl Integral<'_> {
     }
 }
 
+/// The longest edge of a tetrahedron [m].
+fn diameter(vertices: [Point; 4]) -> f64 {
+    let edges = (1..4).flat_map(|a| (0..a).map(move |b| (a, b)));
+    edges.map(|(a, b)| norm(sub(vertices[a], vertices[b]))).fold(0.0, f64::max)
+}
+
 /// The eight tetrahedra that the middles of the edges make.
-fn eighths(tet: [Point; 4]) -> [[Point; 4]; 8] {
-    let mid = |a: usize, b: usize| -> Point { std::array::from_fn(|d| 0.5 * (tet[a][d] + tet[b][d])) };
+fn eighths<V: Copy>(tet: [V; 4], middle: impl Fn(V, V) -> V) -> [[V; 4]; 8] {
+    let mid = |a: usize, b: usize| middle(tet[a], tet[b]);
     let (m01, m02, m03) = (mid(0, 1), mid(0, 2), mid(0, 3));
     let (m12, m13, m23) = (mid(1, 2), mid(1, 3), mid(2, 3));
     let [x0, x1, x2, x3] = tet;

@@ -24,6 +24,16 @@ impl FieldModel {
     /// # Errors
     /// [`SolverError`] names what is missing or out of range.
     pub fn new(mesh: &Mesh, setup: FieldModelSetup) -> Result<Self, SolverError> {
+        Self::with_sources(mesh, setup, None)
+    }
+
+    /// The same of a set-up that differs in order and linear solver from that of a `known` model on this mesh: the integrals of the
+    /// coils over the elements are the same.
+    pub(crate) fn with_sources(
+        mesh: &Mesh,
+        setup: FieldModelSetup,
+        known: Option<&Self>,
+    ) -> Result<Self, SolverError> {
         let (angular_frequency, weak_form) = Self::form_of(mesh, &setup)?;
         let ownership = setup.ownership.as_ref().map(|(ownership, _)| ownership);
         let fine =
@@ -47,9 +57,14 @@ impl FieldModel {
         };
         let of_coils = Self::windings_of(mesh, &setup, angular_frequency)?;
         let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
-        let sources = Sources::new(mesh, &given, &setup.magnetisation())?;
+        let sources = match known {
+            Some(model) => Arc::clone(&model.sources),
+            None => Arc::new(Sources::new(mesh, &given, &setup.magnetisation())?),
+        };
         let solids = Solids::new(&setup.coils, &fine.space, angular_frequency);
-        let windings = Windings::new(mesh, &setup.coils, &of_coils, (&fine.space, &fine.unknowns, &solids))?;
+        let known = known.map(|model| &*model.windings);
+        let spaces = (&fine.space, &fine.unknowns, &solids);
+        let windings = Windings::new(mesh, &setup.coils, (&of_coils, known), spaces)?;
         setup::check_coils(mesh, &setup)?;
         let conductors = weak_form.conductors();
         solids::check(mesh, &setup.coils, (&conductors, &setup.materials), &setup.boundaries)?;
@@ -66,7 +81,7 @@ impl FieldModel {
         }
         let shared = Arc::new(SharedParts { fine, solids, walls, analysis: analysis.map(Arc::new) });
         let (setup, weak_form) = (Arc::new(setup), Arc::new(weak_form));
-        let (sources, windings) = (Arc::new(sources), Arc::new(windings));
+        let windings = Arc::new(windings);
         let model =
             Self { setup, angular_frequency, weak_form, shared, sources, windings, distributed: None };
         Ok(model.distributed_over_ranks(mesh))
