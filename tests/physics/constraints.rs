@@ -6,7 +6,10 @@ use fluxmorph::files::{RunResult, system_disk};
 use fluxmorph::run;
 use fluxmorph::show::{Evaluation, Silent};
 use fluxmorph_optimizer::Error;
-use fluxmorph_optimizer::driver::{Optimised, Record, Recorder, StopReason, optimise};
+use fluxmorph_optimizer::driver::{
+    Optimised, Record, Recorder, Settings, Start, StopReason, Supervisor, Unrecorded, Unsupervised, optimise,
+    optimise_from,
+};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 
 use crate::problems::{Notes, Rows, analysed, initial, objective, optimised};
@@ -419,4 +422,11 @@ fn a_share_of_a_value_that_is_not_positive_is_refused_by_name() {
     let ended = optimise(&mut problem, &settings.settings(), &mut Silent, &mut Rows::default(), &|| false);
     let text = ended.expect_err("no share").to_string();
     assert!(text.contains("field_component_observation") && text.contains("to be a share of"), "{text}");
+    // A search that began on a coarser mesh, where the value was positive, goes on with the bound that it had.
+    let start = Start { level: 1, evaluations: 5, bounds: vec![2e-3], ..Start::default() };
+    let settings = Settings { max_evaluations: 7, ..settings.settings() };
+    let recorded: (&mut dyn Recorder, &mut dyn Supervisor) = (&mut Unrecorded, &mut Unsupervised);
+    let ended = optimise_from(&start, &mut problem, &settings, &mut Silent, recorded, &|| false);
+    let bounds = ended.unwrap_or_else(|e| panic!("{e}")).bounds;
+    assert_eq!(bounds.iter().map(|bound| bound.value).collect::<Vec<_>>(), [2e-3]);
 }

@@ -221,6 +221,7 @@ fn a_fresh_mesh_confirms(name: &str, setup: &Setup, optimised: &Optimised) {
         fresh,
         meshes: None,
         sizes: Sizes::of(&setup.problem),
+        constraints: &[],
     };
     gain.verify(&mut objective, &|| false, &mut Silent);
     let verified = objective.verified_ratio.expect("the shield can be generated anew");

@@ -135,7 +135,8 @@ fn idle_warning(surface: &DesignSurface) -> Option<String> {
 /// A filter that sees no neighbour of any node.
 fn blind_filter_warning(surface: &DesignSurface, mesh: &Mesh, triangles: &[[NodeId; 3]]) -> Option<String> {
     let radius = surface.filter_radius()?;
-    surface.rows().iter().all(|row| row.len() <= 1).then(|| {
+    let rows = surface.rows();
+    (rows.iter().all(|row| row.len() <= 1) && rows.iter().any(|row| !row.is_empty())).then(|| {
         format!(
             "design.filter_radius is {:.4} mm, and no node of the surface has another one as near: nothing is smoothed, each node moves \
              on its own, and what that gains may be lost on another mesh; by default it is {:.3} mm here",

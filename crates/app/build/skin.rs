@@ -62,7 +62,7 @@ impl Audited {
             // Neither model must send to the other where that one has an objection too.
             (RegionModel::Volume, PermeabilityOf::Material) if thin.is_some() => coarse.map(|text| {
                 format!(
-                    "{}. Refine the skin: an impedance surface is no way out, for which the region is too thin, {}",
+                    "{}. Refine the skin; an impedance surface cannot stand for the region, which is too thin for one, {}",
                     finding(&text),
                     self.audit.thinness().unwrap_or_default()
                 )

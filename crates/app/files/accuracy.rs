@@ -149,17 +149,34 @@ impl Accuracy {
         self.levels = refinements.refinements.iter().map(level).collect();
     }
 
-    /// Whether a gain that is confirmed is smaller than the error bar of its ratio.
-    pub fn hides_gain(&self, ratio: f64) -> bool {
-        let bar = self.error_estimate_relative.map(|error| SAFETY * error * ratio.abs());
-        self.verdict == Some(Verdict::Confirmed) && bar.is_some_and(|bar| bar >= (ratio - 1.0).abs())
+    /// Whether a gain that is confirmed is smaller than its error bar: as a ratio, or where there is none in the unit of the objective.
+    pub fn hides_gain(&self, objective: &ObjectiveResult) -> bool {
+        let (initial, best, ratio) = (objective.initial, objective.best, objective.ratio);
+        let hidden = match self.error_estimate {
+            Some(errors) if !self.has_ratio([initial, best]) => {
+                let largest = errors[0].abs().max(errors[1].abs());
+                let error = (errors[1] - errors[0]).abs().max(UNCANCELLED * largest);
+                Some(SAFETY * error >= (best - initial).abs())
+            }
+            _ => {
+                self.error_estimate_relative.map(|error| SAFETY * error * ratio.abs() >= (ratio - 1.0).abs())
+            }
+        };
+        self.verdict == Some(Verdict::Confirmed) && hidden == Some(true)
+    }
+
+    /// Whether the initial value is a measure of the best one: it is of the same sign, not near zero beside it, and beyond its own
+    /// error bar where that is known.
+    fn has_ratio(&self, [initial, best]: [f64; 2]) -> bool {
+        let bar = self.error_estimate.map_or(0.0, |errors| SAFETY * errors[0].abs());
+        best / initial > 0.0 && initial.abs() >= LEAST_START * best.abs() && initial.abs() > bar
     }
 
     /// What is to be said of a gain that is confirmed.
     pub fn reservation(&self, objective: &ObjectiveResult) -> Option<&'static str> {
         match self.verdict? {
             Verdict::NotConfirmed => None,
-            Verdict::Confirmed if self.hides_gain(objective.ratio) => Some("smaller than its error bar"),
+            Verdict::Confirmed if self.hides_gain(objective) => Some("smaller than its error bar"),
             Verdict::Confirmed => objective
                 .is_violated_on_finer_mesh()
                 .then_some("of a shape that violates constraints on the finer mesh"),
@@ -188,19 +205,20 @@ impl Accuracy {
     /// Judges a gain by what other computations have for the objective of the initial and of the best shape; nothing is said of hardly
     /// any gain, or by none. Half of the gain must be left as a ratio, and a quarter of it in the unit of the objective: where a mesh
     /// has most of both values wrong, the ratio of what is left may be anything. Of a value that begins near zero, or passes through
-    /// it, there is no ratio: half of the gain must then be left in the unit of the objective.
-    pub fn judge(&mut self, [initial, best]: [f64; 2], others: &[[f64; 2]]) {
+    /// it, there is no ratio: half of the gain must then be left in the unit of the objective. That will do, too, where the initial
+    /// value is within its own error bar.
+    pub fn judge(&mut self, own: [f64; 2], others: &[[f64; 2]]) {
+        let [initial, best] = own;
         let gain = best / initial - 1.0;
         if gain.is_nan() || gain.abs() < LEAST_GAIN || others.is_empty() {
             return;
         }
-        let has_ratio = best / initial > 0.0 && initial.abs() >= LEAST_START * best.abs();
+        let is_near_zero = best / initial <= 0.0 || initial.abs() < LEAST_START * best.abs();
+        let has_ratio = self.has_ratio(own);
         let is_left = others.iter().all(|[first, last]| {
             let (as_ratio, in_unit) = ((last / first - 1.0) / gain, (last - first) / (best - initial));
-            match has_ratio {
-                true => as_ratio >= LEAST_SHARE && in_unit >= LEAST_SHARE_IN_UNIT,
-                false => in_unit >= LEAST_SHARE,
-            }
+            !is_near_zero && as_ratio >= LEAST_SHARE && in_unit >= LEAST_SHARE_IN_UNIT
+                || !has_ratio && in_unit >= LEAST_SHARE
         });
         self.verdict = Some(if is_left { Verdict::Confirmed } else { Verdict::NotConfirmed });
     }
@@ -254,6 +272,57 @@ mod tests {
         assert_eq!(verdict_of(own, &[[0.7214, 0.2647], [0.70, 0.249]]), Some(Verdict::Confirmed));
         assert_eq!(verdict_of(own, &[[0.7214, 0.5214]]), Some(Verdict::NotConfirmed));
         assert_eq!(verdict_of([5.7e-8, 1.7306], &[[0.3465, 1.9867]]), Some(Verdict::Confirmed));
+    }
+
+    /// A force of which the mesh has more error than value at first, on a fresh mesh and in second order.
+    #[test]
+    fn a_value_within_its_error_bar_is_no_measure_of_a_gain() {
+        let own = [1.575e-4, 1.4386e-3];
+        let others = [[4.128e-4, 1.9218e-3], [4.012e-4, 1.9723e-3]];
+        assert_eq!(verdict_of(own, &others), Some(Verdict::NotConfirmed), "as far as is known");
+        let judged = |errors: [f64; 2], others: &[[f64; 2]]| {
+            let mut accuracy = Accuracy { error_estimate: Some(errors), ..Accuracy::default() };
+            accuracy.judge(own, others);
+            accuracy.verdict
+        };
+        let errors = [2.437e-4, 5.337e-4];
+        assert_eq!(judged(errors, &others), Some(Verdict::Confirmed));
+        assert_eq!(judged(errors, &[[4.128e-4, 9.2e-4]]), Some(Verdict::NotConfirmed));
+        // Most of this content is the mesh's at first, of which the ratio is the measure all the same.
+        let content = [4.369e-5, 2.807e-6];
+        let mut accuracy = Accuracy { error_estimate: Some([-2.215e-5, -6.2e-7]), ..Accuracy::default() };
+        accuracy.judge(content, &[[2.154e-5, 2.186e-6]]);
+        assert_eq!(accuracy.verdict, Some(Verdict::Confirmed));
+    }
+
+    /// The errors of both values differ by a seventh of the gain, whatever is left of the initial one.
+    #[test]
+    fn a_gain_from_near_zero_is_held_against_its_error_in_its_unit() {
+        let hidden = |[initial, best]: [f64; 2], errors: [f64; 2]| {
+            let objective = ObjectiveResult { initial, best, ratio: best / initial, ..objective() };
+            let mut accuracy = Accuracy::default();
+            let corrected = accuracy.estimated([initial, best], errors);
+            accuracy.judge([initial, best], &[corrected]);
+            assert_eq!(accuracy.verdict, Some(Verdict::Confirmed));
+            accuracy.hides_gain(&objective)
+        };
+        assert!(!hidden([3.648e-4, 2.4518e-3], [-2.94e-4, -8e-6]));
+        assert!(!hidden([-3.9e-5, 2.498e-3], [3.1e-5, 4.2e-4]));
+        assert!(hidden([-3.9e-5, 2.498e-3], [-1.3e-3, 4.2e-4]));
+        assert!(hidden([1.0, 0.99], [-0.1, -0.11]));
+    }
+
+    fn objective() -> ObjectiveResult {
+        ObjectiveResult {
+            initial: 1.0,
+            best: 1.0,
+            ratio: 1.0,
+            best_evaluation: 1,
+            verified_ratio: None,
+            verification: None,
+            homogeneity: None,
+            terms: Vec::new(),
+        }
     }
 
     #[test]

@@ -178,8 +178,8 @@ pub struct Verification {
     pub refinement: f64,
     /// Its tetrahedra.
     pub tets: usize,
-    /// How far the best shape is there from that of the run, and of cut elements from what the control grid describes; `None` where
-    /// nodes are the variables.
+    /// On a fresh mesh how far the best shape is from that of the run, on cut elements how far its facets are from what the control
+    /// grid describes; `None` where nodes are the variables.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub deviation: Option<ShapeDeviation>,
     /// The objective at the initial design there.

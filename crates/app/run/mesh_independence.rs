@@ -16,6 +16,7 @@
 use fluxmorph_geometry::Millimetres;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::Error as OptimizerError;
+use fluxmorph_optimizer::constraint::{Bound, Constraint};
 use fluxmorph_optimizer::driver::StopReason;
 use fluxmorph_optimizer::memory_estimate::Sizes;
 use fluxmorph_optimizer::problem::{Analysis, Derivatives, NoProgress, Problem, SolverCache};
@@ -27,15 +28,15 @@ use super::summary;
 use crate::build::{DividedMesh, Mode, memory_limit, set_up_on};
 use crate::config::{Config, SourceMap};
 use crate::error::Error;
-use crate::files::{ObjectiveResult, ShapeDeviation, Verification, VerificationMesh};
+use crate::files::{ConstraintResult, ObjectiveResult, ShapeDeviation, Verification, VerificationMesh};
 use crate::show::{self, Observer};
 
 /// Counted work of a shape on a fresh mesh, in evaluations, beyond which elements are cut instead. The shipped runs have 4 to 21, and
 /// second-order edge elements of `shield_edge.toml`, which would take twenty minutes after a search of three, 29.
 const MOST_EVALUATIONS: f64 = 25.0;
 
-/// Share of its motion by which the surface of a control grid may be off that of the run: between the nodes of coarse cells a smooth
-/// shape is off by some percent.
+/// Share of its motion by which the surface of a control grid may be off that of the run, or its facets off what it describes: between
+/// the nodes of coarse cells a smooth shape is off by some percent.
 const LARGEST_DEVIATION: f64 = 0.1;
 
 /// Share of the gain by which both ratios may be apart all the same.
@@ -67,6 +68,8 @@ pub struct MeshIndependence<'a> {
     pub meshes: Option<&'a ShapeMeshes>,
     /// What the run's problem holds, from which the memory of a finer one follows.
     pub sizes: Sizes,
+    /// Its constraints.
+    pub constraints: &'a [ConstraintResult],
 }
 
 /// What a check comes to.
@@ -195,8 +198,8 @@ impl MeshIndependence<'_> {
         let Some(analyses) = finer.analyses(&meshes.solved, interrupted)? else {
             return Ok(Outcome::CutShort);
         };
-        let found = verification(&finer.setup.problem, (VerificationMesh::Cut, parts), &analyses)?;
-        Ok(Outcome::Found(Verification { deviation: self.shapes.between_nodes(), ..found }))
+        let found = self.verification(&finer.setup.problem, (VerificationMesh::Cut, parts), &analyses)?;
+        Ok(Outcome::Found(Verification { deviation: self.shapes.facet_deviation(), ..found }))
     }
 
     /// Both values on the fresh mesh, or on cut elements where it cannot be moved to the best shape or costs too much.
@@ -248,45 +251,49 @@ impl MeshIndependence<'_> {
             return Ok(Outcome::CutShort);
         };
         let mesh = (VerificationMesh::Fresh, fresh.parts as f64);
-        let found = verification(&problem, mesh, &analyses)?;
+        let found = self.verification(&problem, mesh, &analyses)?;
         Ok(Outcome::Found(Verification { deviation, ..found }))
     }
-}
 
-/// What the analyses of the initial and the best shape on such a mesh come to.
-fn verification(
-    problem: &Problem,
-    (mesh, refinement): (VerificationMesh, f64),
-    [initial, best]: &[Analysis; 2],
-) -> Result<Verification, Error> {
-    let [of_initial, of_best] = [initial, best].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
-    let ratio = of_best / of_initial;
-    if !ratio.is_finite() {
-        let cause = "the objective of the initial design is zero on the finer mesh";
-        return Err(OptimizerError::Optimisation { cause }.into());
+    /// What the analyses of the initial and the best shape on such a mesh come to.
+    fn verification(
+        &self,
+        problem: &Problem,
+        (mesh, refinement): (VerificationMesh, f64),
+        [initial, best]: &[Analysis; 2],
+    ) -> Result<Verification, Error> {
+        let [of_initial, of_best] = [initial, best].map(|analysis| analysis.objective.unwrap_or(f64::NAN));
+        let ratio = of_best / of_initial;
+        if !ratio.is_finite() {
+            let cause = "the objective of the initial design is zero on the finer mesh";
+            return Err(OptimizerError::Optimisation { cause }.into());
+        }
+        // A share of an initial value that is not positive there: the bound of the run.
+        let known = |own: &Constraint| {
+            self.constraints.iter().find(|found| found.name == own.name).map(|found| found.bound)
+        };
+        let measured = problem.constraints().iter().zip(&initial.constraints);
+        let bounds = measured.map(|(own, at_initial)| own.bound_beside(known(own), at_initial.value));
+        let bounds: Vec<Bound> = bounds.collect::<Result<_, OptimizerError>>()?;
+        Ok(Verification {
+            mesh,
+            refinement,
+            tets: problem.original().topology().tets().len(),
+            deviation: None,
+            initial: of_initial,
+            best: of_best,
+            ratio,
+            constraints: summary::constraints(problem, best, &bounds),
+        })
     }
-    let bounds = problem.bounds(None, initial)?;
-    Ok(Verification {
-        mesh,
-        refinement,
-        tets: problem.original().topology().tets().len(),
-        deviation: None,
-        initial: of_initial,
-        best: of_best,
-        ratio,
-        constraints: summary::constraints(problem, best, &bounds),
-    })
 }
 
 /// That the best shape is so far from what its control grid describes that another mesh has another one: on a fresh mesh, where the
 /// ratios of both differ, and on cut elements, which have the facets of the run.
 fn of_another_shape(found: &Verification, ratio: f64) -> Option<String> {
     let ShapeDeviation { distance_m, motion_m } = found.deviation?;
-    let differs = match found.mesh {
-        VerificationMesh::Fresh => (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs(),
-        VerificationMesh::Cut => true,
-    };
-    if distance_m <= LARGEST_DEVIATION * motion_m || !differs {
+    let differs = (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs();
+    if distance_m <= LARGEST_DEVIATION * motion_m || found.mesh == VerificationMesh::Fresh && !differs {
         return None;
     }
     let off = format!("up to {:.3} mm from", Millimetres(distance_m));
@@ -294,13 +301,13 @@ fn of_another_shape(found: &Verification, ratio: f64) -> Option<String> {
     let why = "as the control grid is finer than the cells of the surface, or bends within them";
     Some(match found.mesh {
         VerificationMesh::Fresh => format!(
-            "F/F0 on the fresh mesh, {}, is that of another shape: {off} that of the run, {motion}, {why}; a coarser grid or smaller \
-             cells have one shape",
+            "F/F0 on the fresh mesh, {}, is that of another shape: {off} that of the run, {motion}, {why}; with a coarser grid or smaller \
+             cells both have one shape",
             show::ratio(found.ratio)
         ),
         VerificationMesh::Cut => format!(
-            "the best shape is {off} the surface that design.grid describes, {motion}, {why}: the cut elements have the facets of the \
-             run, and on another mesh the same variables have another shape and another F/F0; a coarser grid or smaller cells have one"
+            "the facets of the best shape are {off} the surface that design.grid describes, {motion}, {why}; this check keeps them, and on \
+             another mesh the same variables are another shape, whose F/F0 may differ: take a coarser grid or smaller cells"
         ),
     })
 }

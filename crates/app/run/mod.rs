@@ -427,6 +427,7 @@ impl Session<'_> {
             fresh: fresh.as_ref(),
             meshes: Some(meshes),
             sizes,
+            constraints: &result.constraints,
         };
         let keeps_all = result.violated().is_empty();
         if let Some(objective) = &mut result.objective {

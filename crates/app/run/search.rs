@@ -141,6 +141,7 @@ impl<'a> Session<'a> {
                 evaluations: optimised.evaluations,
                 iterations: optimised.iterations,
                 design: Some(optimised.best.values.clone()),
+                bounds: optimised.bounds.iter().map(|bound| bound.value).collect(),
             };
             before = Some(optimised);
         }

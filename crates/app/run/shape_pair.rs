@@ -27,8 +27,8 @@ pub struct Change {
     surface: Triangulation,
     /// Displacements of its nodes [m], each of shape `(n_nodes, 3)`.
     displacements: [Vec<Point>; 2],
-    /// How far the best shape is from what a control grid describes.
-    between_nodes: Option<ShapeDeviation>,
+    /// How far the facets of the best shape are from the surface that a control grid describes.
+    facet_deviation: Option<ShapeDeviation>,
 }
 
 impl ShapePair {
@@ -49,8 +49,8 @@ impl ShapePair {
         let surface = design_triangulation(design, &setup.full_mesh)?;
         let pair = [shape.initial(), best];
         let displacements = pair.map(|p| shape.displacement(p));
-        let off = shape.surface().distance_from_facets(&surface, best);
-        let between_nodes = off.map(|distance_m| ShapeDeviation {
+        let distance_m = shape.surface().distance_from_facets(&surface, best);
+        let facet_deviation = distance_m.map(|distance_m| ShapeDeviation {
             distance_m,
             motion_m: longest(displacements[1].iter().copied()),
         });
@@ -58,14 +58,14 @@ impl ShapePair {
             variables: design.grid.is_some().then(|| pair.map(<[f64]>::to_vec)),
             surface,
             displacements,
-            between_nodes,
+            facet_deviation,
         })))
     }
 
     /// How far the facets of the best shape are from the surface that a control grid describes; `None` without one.
-    pub(super) fn between_nodes(&self) -> Option<ShapeDeviation> {
+    pub(super) fn facet_deviation(&self) -> Option<ShapeDeviation> {
         let Self::Changed(change) = self else { return None };
-        change.between_nodes
+        change.facet_deviation
     }
 
     /// Both shapes on another mesh of the same configuration.

@@ -139,17 +139,25 @@ impl Constraint {
                 });
             }
         };
-        let scale = [value, initial].into_iter().map(f64::abs).find(|&s| s > 0.0).unwrap_or(1.0);
-        let sign = if matches!(self.limit, Limit::AtLeast(_) | Limit::AtLeastRatio(_)) { -1.0 } else { 1.0 };
-        Ok(Bound { value, slope: sign / scale })
+        Ok(self.bound_at(value, initial))
     }
 
-    /// What a share beyond the bound is one of, in words: where that is zero, as [`Bound::excess`].
-    pub fn excess_is_of(&self) -> &'static str {
-        match self.limit {
-            Limit::AtMost(0.0) | Limit::AtLeast(0.0) => "of the initial value",
-            _ => "of it",
+    /// As [`Constraint::bound`] on another mesh than that of a bound which is `known`: that one where the initial value on this mesh
+    /// is none that there are ratios to.
+    ///
+    /// # Errors
+    /// As [`Constraint::bound`], where none is known.
+    pub fn bound_beside(&self, known: Option<f64>, initial: f64) -> Result<Bound, Error> {
+        match (self.bound(initial), known) {
+            (Err(_), Some(value)) => Ok(self.bound_at(value, initial)),
+            (bound, _) => bound,
         }
+    }
+
+    fn bound_at(&self, value: f64, initial: f64) -> Bound {
+        let scale = [value, initial].into_iter().map(f64::abs).find(|&s| s > 0.0).unwrap_or(1.0);
+        let sign = if matches!(self.limit, Limit::AtLeast(_) | Limit::AtLeastRatio(_)) { -1.0 } else { 1.0 };
+        Bound { value, slope: sign / scale }
     }
 
     /// What is to be said of a bound that is far from the value of the initial design, on its other side or in size.
@@ -177,6 +185,15 @@ impl Bound {
     /// `c` of a value: satisfied where not positive.
     pub fn excess(&self, value: f64) -> f64 {
         self.slope * (value - self.value)
+    }
+
+    /// What an excess is a share of, in words: the bound, of a bound of zero the initial value; in SI where both are zero.
+    pub fn excess_is(&self) -> &'static str {
+        match (self.value, self.slope.abs()) {
+            (0.0, 1.0) => "in SI",
+            (0.0, _) => "of the initial value",
+            _ => "of it",
+        }
     }
 
     /// `dc/dp` from the value's gradient.
@@ -237,6 +254,10 @@ mod tests {
         assert_eq!((upper.excess(5.0), upper.excess(3.0)), (0.25, -0.25));
         let lower = constraint(Limit::AtLeast(4.0)).bound(7.0).expect("a number");
         assert_eq!((lower.excess(5.0), lower.excess(3.0)), (-0.25, 0.25));
+        let of_zero = |initial| constraint(Limit::AtMost(0.0)).bound(initial).expect("a number");
+        assert_eq!((of_zero(4.0).excess(1.0), of_zero(0.0).excess(1.0)), (0.25, 1.0));
+        let said = [lower, of_zero(-4.0), of_zero(0.0)].map(|bound| bound.excess_is());
+        assert_eq!(said, ["of it", "of the initial value", "in SI"]);
         assert_eq!(lower.gradient(&[2.0, -4.0]), [-0.5, 1.0]);
         let ratio = constraint(Limit::AtMostRatio(0.5)).bound(8.0).expect("a positive value");
         assert_eq!(ratio, upper);
@@ -256,5 +277,10 @@ mod tests {
     fn a_ratio_to_nothing_is_refused_by_name() {
         let error = constraint(Limit::AtMostRatio(0.5)).bound(-1.0).expect_err("not positive").to_string();
         assert!(error.contains("`field`") && error.contains("-1"), "{error}");
+        // On another mesh the bound is known.
+        let known = constraint(Limit::AtLeastRatio(0.5)).bound_beside(Some(3.0), -1.0).expect("a number");
+        assert_eq!((known.value, known.excess(6.0)), (3.0, -1.0));
+        let own = constraint(Limit::AtMostRatio(0.5)).bound_beside(Some(3.0), 8.0).expect("a positive value");
+        assert_eq!(own.value, 4.0);
     }
 }

@@ -110,7 +110,7 @@ pub struct WeightedResidual {
 }
 
 impl FieldModel {
-    /// The same problem in second order on the undeformed mesh, to be solved roughly and with so much effort.
+    /// The same problem in second order on the undeformed mesh, for which this model was made, to be solved roughly and with so much effort.
     ///
     /// # Errors
     /// As [`FieldModel::new`]; [`SolverError::Parameter`] where there is no higher order, or several ranks, and for nodal elements at

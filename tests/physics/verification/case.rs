@@ -21,7 +21,7 @@ pub(crate) fn solved(config: &str, size: MeshSize) -> Value {
     let folder = folder();
     let (config, out) = (repository("configs").join(config), folder.path().join("run"));
     let mut command = command(&[&"solve", &config, &"--out", &out, &"--json", &"--quiet"]);
-    // The measurements are the bar; what an estimate of second order says is no part of a comparison.
+    // It is held against measurements: the error estimate is not looked at, and takes longer than all else.
     command.args(["--set", "accuracy.estimate=false"]);
     if size == MeshSize::Coarse {
         command.args(["--set", "mesh.boxes.refinement=0.6"]);

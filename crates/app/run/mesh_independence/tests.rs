@@ -74,7 +74,8 @@ fn verified_in(
         FreshMesh { mesh, parts, memory: [0; 2], ..fresh }
     });
     let (fresh, meshes, sizes) = (fresh.as_ref(), None, Sizes::of(&problem));
-    let check = MeshIndependence { config, source, stop_reason, shapes, fresh, meshes, sizes };
+    let constraints = &[];
+    let check = MeshIndependence { config, source, stop_reason, shapes, fresh, meshes, sizes, constraints };
     check.verify(&mut objective, &|| interrupted, &mut recorded);
     (objective, recorded)
 }
@@ -149,12 +150,12 @@ fn a_grid_that_is_finer_than_the_cells_has_another_shape_on_a_fresh_mesh() {
 
 /// Cut elements have the facets of the run, and their ratio says nothing of what lies between the nodes.
 #[test]
-fn what_a_grid_describes_between_the_nodes_is_said_to_be_on_no_cut_element() {
+fn a_grid_that_bends_within_the_facets_is_told_of_on_cut_elements() {
     let (config, source) = quick(false);
     let setup = set_up(&config, &source, Mode::Optimisation).expect("a sound problem");
-    for (best, is_another) in [(peaks(), true), (dished(&setup), false)] {
-        let shapes = ShapePair::of(&config, &setup, &best).expect("a design surface");
-        let deviation = shapes.between_nodes();
+    for (shape, is_another) in [(peaks(), true), (dished(&setup), false)] {
+        let shapes = ShapePair::of(&config, &setup, &shape).expect("a design surface");
+        let deviation = shapes.facet_deviation();
         let ShapeDeviation { distance_m, motion_m } = deviation.expect("a control grid");
         println!("up to {distance_m} of {motion_m} m");
         let (mesh, constraints) = (VerificationMesh::Cut, Vec::new());
@@ -227,11 +228,13 @@ fn where_a_fresh_mesh_costs_too_much_elements_are_cut() {
         fresh: Some(&fresh),
         meshes: Some(&meshes),
         sizes: Sizes::of(problem),
+        constraints: &[],
     };
     let mut recorded = Recorded::default();
     let found = check.compute(&fresh, &|| false, &mut recorded).expect("both are computed");
     let Outcome::Found(found) = found else { panic!("cut short, or too large") };
     assert!(found.tets >= 2 * tets && (0.5..0.999).contains(&found.ratio), "{found:?}");
+    assert_eq!(found.deviation, shapes.facet_deviation());
     assert!(recorded.notices.iter().any(|notice| notice.contains("cut, instead")), "{:?}", recorded.notices);
 }
 

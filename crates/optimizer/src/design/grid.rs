@@ -6,6 +6,7 @@
 use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::tet4::Point;
 
+use super::symmetry::Groups;
 use super::{DesignError, Row, axis_name};
 
 /// How far from the control grid's rectangle, in grid cells, a node may lie through rounding.
@@ -40,6 +41,20 @@ impl GridSide {
     /// From one point to the next [m].
     pub fn spacing(&self) -> f64 {
         self.extent / (self.count - 1) as f64
+    }
+}
+
+/// A control grid with the variables of its points.
+#[derive(Clone, Debug)]
+pub(super) struct ControlGrid {
+    pub(super) grid: Grid,
+    pub(super) groups: Groups,
+}
+
+impl ControlGrid {
+    /// What the variables `p` [m] describe at a place [m].
+    pub(super) fn height(&self, place: Point, p: &[f64]) -> f64 {
+        self.grid.row(place).into_iter().map(|(k, weight)| weight * p[self.groups.variable(k)]).sum()
     }
 }
 
@@ -152,36 +167,5 @@ impl Grid {
                 point
             })
             .collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::tests::{build, moved_block, outward};
-    use super::super::{Control, DesignSetup, Direction, Mirror, Triangulation};
-    use super::*;
-
-    /// Two triangles, whose common edge is a diagonal: a bilinear height is off them by a quarter of its twist in the middle, and a peak
-    /// there by all of it.
-    #[test]
-    fn a_surface_is_as_far_from_its_facets_as_it_bends_within_them() {
-        let mesh = moved_block(1, |x| x);
-        let faces = outward(&mesh, "z_max");
-        let facets = Triangulation::new(&mesh, &faces);
-        let off = |control: Control, mirrors: Vec<Mirror>, of: &dyn Fn(Point) -> f64| {
-            let base = DesignSetup::new(&faces, Direction::Along([0.0, 0.0, 1.0]));
-            let surface = build(&mesh, &DesignSetup { control, mirrors, ..base });
-            let p: Vec<f64> = surface.points().iter().map(|&x| of(x)).collect();
-            surface.distance_from_facets(&facets, &p)
-        };
-        let peak = |x: Point| if (x[0], x[1]) == (0.5, 0.5) { 2.0 } else { 0.0 };
-        let (square, nine) = (Control::Grid([2, 2]), Control::Grid([3, 3]));
-        let found = |distance: Option<f64>| distance.expect("a grid");
-        assert!(found(off(square, Vec::new(), &|x| 3.0 * x[0] - x[1])) < 1e-15);
-        assert!((found(off(square, Vec::new(), &|x| x[0] * x[1])) - 0.25).abs() < 1e-15);
-        for mirrors in [Vec::new(), vec![Mirror { axis: 0, at: 0.5 }]] {
-            assert!((found(off(nine, mirrors, &peak)) - 2.0).abs() < 1e-15);
-        }
-        assert_eq!(off(Control::Nodes, Vec::new(), &peak), None);
     }
 }

@@ -7,9 +7,10 @@
 //! (`boundary_edges`). In every case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at a node
 //! that stays. So the displacements of the surface's faces keep the bounds of the variables, and the transpose, which takes
 //! derivatives at the nodes to those with respect to `p`, is exact. On a finer mesh of the same body the variables stay what
-//! they are (`refined`).
+//! they are (`refined`). What a grid describes between the nodes the facets have only about (`facets`).
 
 mod boundary_edges;
+mod facets;
 mod filter;
 mod grid;
 mod normal;
@@ -175,29 +176,6 @@ fn axis_name(axis: usize) -> char {
     ['x', 'y', 'z'][axis]
 }
 
-/// A control grid with the variables of its points.
-#[derive(Clone, Debug)]
-struct ControlGrid {
-    cells: grid::Grid,
-    groups: symmetry::Groups,
-}
-
-impl ControlGrid {
-    /// What the grid describes at a place [m].
-    fn height(&self, place: Point, p: &[f64]) -> f64 {
-        self.cells.row(place).into_iter().map(|(k, weight)| weight * p[self.groups.variable(k)]).sum()
-    }
-}
-
-/// Parts of each edge of a facet between whose ends a grid is looked at.
-const PARTS: usize = 6;
-
-/// Barycentric coordinates of points of a triangle, evenly over it.
-fn lattice() -> impl Iterator<Item = [f64; 3]> {
-    let points = (0..=PARTS).flat_map(|i| (0..=PARTS - i).map(move |j| [i, j, PARTS - i - j]));
-    points.map(|counts| counts.map(|count| count as f64 / PARTS as f64))
-}
-
 /// The linear map from design variables to displacements of the design surface's nodes.
 #[derive(Clone, Debug)]
 pub struct DesignSurface {
@@ -209,7 +187,7 @@ pub struct DesignSurface {
     rows: Vec<Row>,
     points: Vec<Point>,
     filter_radius: Option<f64>,
-    grid: Option<ControlGrid>,
+    grid: Option<grid::ControlGrid>,
 }
 
 impl DesignSurface {
@@ -255,12 +233,12 @@ impl DesignSurface {
                 (rows, places, symmetry::groups(nodes.len(), &pairs))
             }
             Control::Grid(counts) => {
-                let cells = grid::Grid::new(&places, &directions, counts)?;
-                let points = cells.points(&places);
-                let pairs = symmetry::pairs("control point", &cells.flat(&points), &setup.mirrors)?;
+                let own = grid::Grid::new(&places, &directions, counts)?;
+                let points = own.points(&places);
+                let pairs = symmetry::pairs("control point", &own.flat(&points), &setup.mirrors)?;
                 let groups = symmetry::groups(points.len(), &pairs);
-                let rows = places.iter().map(|&x| cells.row(x)).collect();
-                grid = Some(ControlGrid { cells, groups: groups.clone() });
+                let rows = places.iter().map(|&x| own.row(x)).collect();
+                grid = Some(grid::ControlGrid { grid: own, groups: groups.clone() });
                 (rows, points, groups)
             }
         };
@@ -335,25 +313,7 @@ impl DesignSurface {
 
     /// The sides of the control grid, where there is one; the first is slow in the order of the variables.
     pub fn grid_sides(&self) -> Option<[GridSide; 2]> {
-        Some(self.grid.as_ref()?.cells.sides())
-    }
-
-    /// How far the surface that a control grid describes with the variables `p` [m] is from the `facets` of the mesh at most, in the
-    /// directions of the nodes [m]: a grid bends within facets that are coarser than it is. Not looked at are facets with a node
-    /// that stays. `None` without a grid.
-    pub fn distance_from_facets(&self, facets: &Triangulation, p: &[f64]) -> Option<f64> {
-        let grid = self.grid.as_ref()?;
-        let heights = self.normal_displacements(p);
-        let distance = |triangle: &[usize; 3], weights: [f64; 3]| {
-            let mean = |of: &dyn Fn(usize) -> f64| {
-                triangle.iter().zip(weights).map(|(&i, weight)| weight * of(i)).sum::<f64>()
-            };
-            let place = std::array::from_fn(|d| mean(&|i| facets.places[i][d]));
-            (grid.height(place, p) - mean(&|i| heights[i])).abs()
-        };
-        let moving = facets.triangles.iter().filter(|t| t.iter().all(|&i| !self.rows[i].is_empty()));
-        let all = moving.flat_map(|triangle| lattice().map(move |weights| distance(triangle, weights)));
-        Some(all.fold(0.0, f64::max))
+        Some(self.grid.as_ref()?.grid.sides())
     }
 
     /// Where the variables sit on the undeformed surface [m], shape `(n_variables, 3)`.

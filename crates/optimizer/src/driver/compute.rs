@@ -169,8 +169,9 @@ impl Run<'_> {
             };
             return Err(Error::Optimisation { cause });
         }
-        let constraints = self.problem.constraints().iter().zip(measured);
-        let bounds = constraints.map(|(constraint, &value)| constraint.bound(value));
+        let constraints = self.problem.constraints().iter().zip(measured).enumerate();
+        let known = |k: usize| self.known_bounds.get(k).copied();
+        let bounds = constraints.map(|(k, (own, &value))| own.bound_beside(known(k), value));
         let bounds = bounds.collect::<Result<_, _>>()?;
         let initial = Initial { objective, members, quality, bounds };
         Ok(self.initial.insert(initial).clone())

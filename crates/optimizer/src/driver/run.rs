@@ -31,6 +31,8 @@ pub(super) struct Run<'a> {
     pub(super) evaluations: usize,
     pub(super) iterations: usize,
     pub(super) initial: Option<Initial>,
+    /// Bounds of the constraints on a coarser mesh, in SI.
+    pub(super) known_bounds: Vec<f64>,
     /// Whether the design of a coarser mesh is evaluated.
     pub(super) is_taking_up: bool,
     /// Evaluations that were not replayed.
@@ -87,6 +89,7 @@ impl<'a> Run<'a> {
             evaluations: 0,
             iterations: 0,
             initial: None,
+            known_bounds: Vec::new(),
             is_taking_up: false,
             computed: 0,
             last,
@@ -110,7 +113,8 @@ impl<'a> Run<'a> {
     /// Goes on counting where a search on a coarser mesh ended.
     pub(super) fn taking_over(self, start: &Start) -> Self {
         let Start { level, evaluations, iterations, .. } = *start;
-        Self { level, evaluations, first_evaluation: evaluations, iterations, ..self }
+        let known_bounds = start.bounds.clone();
+        Self { level, evaluations, first_evaluation: evaluations, iterations, known_bounds, ..self }
     }
 
     pub(super) fn shape(&self) -> &Shape {
@@ -390,11 +394,14 @@ impl<'a> Run<'a> {
 
     /// What is to be said at the end of the best design and its constraints.
     fn reservations(&self, stop_reason: StopReason) -> Vec<String> {
-        let Some(best) = &self.best else { return Vec::new() };
-        let violated = best.sample.constraints.iter().zip(self.problem.constraints());
+        let (Some(best), Some(initial)) = (&self.best, &self.initial) else { return Vec::new() };
+        let limits = self.problem.constraints().iter().zip(&initial.bounds);
+        let violated = best.sample.constraints.iter().zip(limits);
         let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
         let names: Vec<String> = violated
-            .map(|((excess, _), own)| format!("`{}` by {excess:.1e} {}", own.name, own.excess_is_of()))
+            .map(|((excess, _), (own, bound))| {
+                format!("`{}` by {excess:.1e} {}", own.name, bound.excess_is())
+            })
             .collect();
         let mut warnings = Vec::new();
         let promised = self.surely_promised();
@@ -415,14 +422,14 @@ impl<'a> Run<'a> {
         }
         if let Some(miss) = self.missed().filter(|_| best.violation == 0.0) {
             let (evaluation, objective, (k, excess)) = (miss.evaluation, miss.objective, miss.worst);
-            let constraint = &self.problem.constraints()[k];
+            let (constraint, bound) = (&self.problem.constraints()[k], &initial.bounds[k]);
             warnings.push(format!(
                 "evaluation {evaluation} has an objective of {objective:.6e}, against {:.6e} of the best design, and does not count: it is \
                  beyond the bound of `{}` by {excess:.1e} {}, where {CONSTRAINT_TOLERANCE:e} is kept; allow more evaluations, or another \
                  method of those that take constraints",
                 best.objective,
                 constraint.name,
-                constraint.excess_is_of()
+                bound.excess_is()
             ));
         }
         warnings

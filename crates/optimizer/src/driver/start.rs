@@ -17,6 +17,8 @@ pub struct Start {
     /// The design to go on from [m]; `None` for the initial one. The initial one is evaluated before it: it fixes the scale of
     /// the objective and the bounds of the constraints on this mesh.
     pub design: Option<Vec<f64>>,
+    /// The bounds of the constraints on that mesh, in SI: of shares of an initial value that has another sign on this one.
+    pub bounds: Vec<f64>,
 }
 
 impl Run<'_> {

@@ -92,7 +92,8 @@ impl Driven {
 }
 
 impl Windings {
-    /// Of the coils with a winding, in their order; what makes their loads is that of `known` ones on the same mesh.
+    /// Of the coils with a winding, in their order. `known` are the windings of the same coils on the same mesh, whose sources are
+    /// shared.
     ///
     /// # Errors
     /// As [`Sources::new`].
@@ -105,12 +106,15 @@ impl Windings {
         let of = |(coil, winding): (usize, &Option<Winding>)| -> Option<Result<Driven, SolverError>> {
             let winding = (*winding)?;
             let solid = solids.of_coil(coil);
-            let unit = Coil { ampere_turns: c64::from(winding.turns), ..coils.get(coil)?.clone() };
-            let unit = if solid.is_some() { Vec::new() } else { vec![unit] };
+            let own = coils.get(coil)?;
             let known = known.and_then(|known| known.coils.iter().find(|driven| driven.coil == coil));
             let sources = match known {
                 Some(driven) => Ok(Arc::clone(&driven.sources)),
-                None => Sources::new(mesh, &unit, &[]).map(Arc::new),
+                None if solid.is_some() => Sources::new(mesh, &[], &[]).map(Arc::new),
+                None => {
+                    let unit = Coil { ampere_turns: c64::from(winding.turns), ..own.clone() };
+                    Sources::new(mesh, &[unit], &[]).map(Arc::new)
+                }
             };
             Some(sources.map(|sources| {
                 let mut load = vec![c64::default(); unknowns.dofs.count()];

@@ -188,7 +188,7 @@ fn diameter(vertices: [Point; 4]) -> f64 {
     edges.map(|(a, b)| norm(sub(vertices[a], vertices[b]))).fold(0.0, f64::max)
 }
 
-/// The eight tetrahedra that the middles of the edges make.
+/// The eight tetrahedra that the middles of the edges make; `middle` is that of two vertices.
 fn eighths<V: Copy>(tet: [V; 4], middle: impl Fn(V, V) -> V) -> [[V; 4]; 8] {
     let mid = |a: usize, b: usize| middle(tet[a], tet[b]);
     let (m01, m02, m03) = (mid(0, 1), mid(0, 2), mid(0, 3));

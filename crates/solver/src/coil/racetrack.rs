@@ -112,7 +112,8 @@ impl Racetrack {
             Corner::Mitred => (x - a).max(y - b),
             Corner::Round { inner_radius: r } => {
                 let (dx, dy) = (x - (a - r), y - (b - r));
-                // No `hypot`: lengths of coils have squares, and moments ask for thousands of these an element.
+                // `sqrt`, not `hypot`: squares of a coil's lengths are in the range of numbers, and `moment` takes thousands of these an
+                // element.
                 (dx.max(0.0).powi(2) + dy.max(0.0).powi(2)).sqrt() + dx.max(dy).min(0.0) - r
             }
         }

@@ -6,7 +6,7 @@ use fluxmorph_geometry::Mesh;
 
 use super::{FieldModel, SharedParts};
 use crate::circuit::{self, Solids, Winding, Windings, solids};
-use crate::coil::continuity;
+use crate::coil::{Coil, continuity};
 use crate::discretisation::Discretisation;
 use crate::distributed::{Distributed, Follower};
 use crate::elements::ElementFamily;
@@ -27,8 +27,8 @@ impl FieldModel {
         Self::with_sources(mesh, setup, None)
     }
 
-    /// The same of a set-up that differs in order and linear solver from that of a `known` model on this mesh: the integrals of the
-    /// coils over the elements are the same.
+    /// The same; integrals of the coils over the elements are taken from a `known` model on this mesh that has the same currents. At
+    /// 0 Hz a solid conductor has another resistance in another order, and a voltage drives another current.
     pub(crate) fn with_sources(
         mesh: &Mesh,
         setup: FieldModelSetup,
@@ -58,8 +58,8 @@ impl FieldModel {
         let of_coils = Self::windings_of(mesh, &setup, angular_frequency)?;
         let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
         let sources = match known {
-            Some(model) => Arc::clone(&model.sources),
-            None => Arc::new(Sources::new(mesh, &given, &setup.magnetisation())?),
+            Some(model) if model.given_currents(mesh)? == given => Arc::clone(&model.sources),
+            _ => Arc::new(Sources::new(mesh, &given, &setup.magnetisation())?),
         };
         let solids = Solids::new(&setup.coils, &fine.space, angular_frequency);
         let known = known.map(|model| &*model.windings);
@@ -97,6 +97,12 @@ impl FieldModel {
         circuit::windings(mesh, setup.order, coils, &setup.materials, angular_frequency)
     }
 
+    /// The coils whose currents are known before the field is.
+    fn given_currents(&self, mesh: &Mesh) -> Result<Vec<Coil>, SolverError> {
+        let of_coils = Self::windings_of(mesh, &self.setup, self.angular_frequency)?;
+        Ok(circuit::given_currents(&self.setup.coils, &of_coils, self.angular_frequency))
+    }
+
     /// The same, distributed where it has ranks and is not yet.
     fn distributed_over_ranks(mut self, reference: &Mesh) -> Self {
         if let (Some((ownership, settings)), None) = (&self.setup.ownership, &self.distributed) {
@@ -124,8 +130,7 @@ impl FieldModel {
             let (angular_frequency, weak_form) = Self::form_of(mesh, &setup)?;
             (angular_frequency, Arc::new(weak_form))
         };
-        let own = Self::windings_of(mesh, &self.setup, self.angular_frequency)?;
-        let own = circuit::given_currents(&self.setup.coils, &own, self.angular_frequency);
+        let own = self.given_currents(mesh)?;
         let of_coils = Self::windings_of(mesh, &setup, angular_frequency)?;
         let given = circuit::given_currents(&setup.coils, &of_coils, angular_frequency);
         let sources = if given == own {

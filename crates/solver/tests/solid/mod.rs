@@ -346,7 +346,7 @@ fn the_gradient_of_a_bar_that_moves_matches_central_differences() {
             let last = if is_driven { AtTerminals::Current } else { AtTerminals::Voltage };
             functionals.push(Functional::at_terminals(&model, "bar", last).expect("a winding"));
             if elements.1 == Order::Linear {
-                // A model on a mesh that has moved, as an error estimate makes it, finds the conductor's walls connected still.
+                // A model on a mesh that has moved finds the conductor's walls connected still.
                 let (_, direction) = sway(&mesh);
                 model.enriched(&swayed(&mesh, &direction, 1e-6), Effort::Any).expect("a sound problem");
             }

@@ -6,12 +6,13 @@ use std::sync::Arc;
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_solver::circuit::terminals;
+use fluxmorph_solver::circuit::{Winding, terminals};
+use fluxmorph_solver::enrichment::Effort;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
-use fluxmorph_solver::{ElementFamily, FieldModelSetup, Material, Order};
+use fluxmorph_solver::{ElementFamily, FieldModel, FieldModelSetup, Material, Order};
 
-use super::super::{flux_parallel, painted, solved};
-use super::{COPPER, METAL, coil, impedance, parts};
+use super::super::{OUTSIDE, flux_parallel, painted, solved};
+use super::{COPPER, METAL, NO_CIRCUIT, coil, impedance, parts};
 
 /// Opening of a wedge [rad] whose chord stands for an arc: its area is short of the sector's by a square of it over six, 0.08 %.
 const OPENING: f64 = 0.07;
@@ -249,4 +250,38 @@ fn busbars_have_the_resistance_of_their_integral_equation() {
             assert!(!is_pair || (found.im / exact.im - 1.0).abs() < 0.02, "{found} {exact}");
         }
     }
+}
+
+/// At rest second order has another resistance of a bend, and so has the current that a voltage drives through it: the model of an
+/// estimate knows both, and its winding that of its own.
+#[test]
+fn what_a_voltage_drives_at_rest_is_that_of_the_order_of_an_estimate() {
+    let line = || std::iter::once(0.0).chain(parts(0.0, 30e-3, 6)).collect::<Vec<_>>();
+    let paint = |[x, y, _]: Point| u32::from(x < 10e-3 || y < 10e-3);
+    let mesh = painted([line(), line(), vec![0.0, 5e-3]], &["air", "bend"], paint);
+    let of = |order| {
+        let driven = Winding { voltage: Some(c64::from(1e-3)), ..NO_CIRCUIT };
+        let setup = FieldModelSetup {
+            order,
+            materials: vec![Material::AIR, METAL],
+            coils: vec![coil(&mesh, "bend", ["x_max", "y_max"], 0.0)],
+            windings: vec![Some(driven)],
+            boundaries: flux_parallel(&OUTSIDE),
+            ..FieldModelSetup::default()
+        };
+        FieldModel::new(&mesh, setup).expect("a sound problem")
+    };
+    let coarse = of(Order::Linear);
+    let linkage = |model: &FieldModel| {
+        let (state, _) = model.solve(&mesh).expect("a field");
+        let found = terminals(model, &mesh, &state).expect("terminals");
+        (found.coils[0].flux_linkage.re, found.coils[0].current.re)
+    };
+    let enriched = coarse.enriched(&mesh, Effort::Any).expect("a model");
+    let [first, second, estimated] = [&coarse, &of(Order::Quadratic), &enriched].map(linkage);
+    println!("{first:?} {second:?} {estimated:?}");
+    assert!((first.1 / second.1 - 1.0).abs() > 0.01, "the orders differ");
+    assert!((estimated.1 / second.1 - 1.0).abs() < 1e-12);
+    // An estimate solves to a thousandth.
+    assert!((estimated.0 / second.0 - 1.0).abs() < 2e-3);
 }
