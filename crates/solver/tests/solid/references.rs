@@ -256,9 +256,10 @@ fn busbars_have_the_resistance_of_their_integral_equation() {
 /// estimate knows both, and its winding that of its own.
 #[test]
 fn what_a_voltage_drives_at_rest_is_that_of_the_order_of_an_estimate() {
-    let line = || std::iter::once(0.0).chain(parts(0.0, 30e-3, 6)).collect::<Vec<_>>();
-    let paint = |[x, y, _]: Point| u32::from(x < 10e-3 || y < 10e-3);
-    let mesh = painted([line(), line(), vec![0.0, 5e-3]], &["air", "bend"], paint);
+    let line = || [-10e-3, 0.0].into_iter().chain(parts(0.0, 30e-3, 6)).collect::<Vec<_>>();
+    let is_bend = |[x, y, z]: Point| x.min(y) > 0.0 && x.min(y) < 10e-3 && z > 0.0 && z < 5e-3;
+    let mesh =
+        painted([line(), line(), vec![-5e-3, 0.0, 5e-3, 10e-3]], &["air", "bend"], |x| u32::from(is_bend(x)));
     let of = |order| {
         let driven = Winding { voltage: Some(c64::from(1e-3)), ..NO_CIRCUIT };
         let setup = FieldModelSetup {
