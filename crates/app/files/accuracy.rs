@@ -149,34 +149,37 @@ impl Accuracy {
         self.levels = refinements.refinements.iter().map(level).collect();
     }
 
-    /// Whether a gain that is confirmed is smaller than its error bar: as a ratio, or where there is none in the unit of the objective.
-    pub fn hides_gain(&self, objective: &ObjectiveResult) -> bool {
-        let (initial, best, ratio) = (objective.initial, objective.best, objective.ratio);
-        let hidden = match self.error_estimate {
-            Some(errors) if !self.has_ratio([initial, best]) => {
-                let largest = errors[0].abs().max(errors[1].abs());
-                let error = (errors[1] - errors[0]).abs().max(UNCANCELLED * largest);
-                Some(SAFETY * error >= (best - initial).abs())
+    /// Whether a gain that is confirmed, between the values of the initial and of the best design, is smaller than its error bar: as a
+    /// ratio, or where there is none in the unit of the objective.
+    pub fn hides_gain(&self, own: [f64; 2]) -> bool {
+        let [initial, best] = own;
+        let hides = match self.error_estimate {
+            Some([first, last]) if !self.has_ratio(own) => {
+                let error = (last - first).abs().max(UNCANCELLED * first.abs().max(last.abs()));
+                SAFETY * error >= (best - initial).abs()
             }
             _ => {
-                self.error_estimate_relative.map(|error| SAFETY * error * ratio.abs() >= (ratio - 1.0).abs())
+                let ratio = best / initial;
+                let bar = self.error_estimate_relative.map(|error| SAFETY * error * ratio.abs());
+                bar.is_some_and(|bar| bar >= (ratio - 1.0).abs())
             }
         };
-        self.verdict == Some(Verdict::Confirmed) && hidden == Some(true)
+        self.verdict == Some(Verdict::Confirmed) && hides
     }
 
-    /// Whether the initial value is a measure of the best one: it is of the same sign, not near zero beside it, and beyond its own
-    /// error bar where that is known.
-    fn has_ratio(&self, [initial, best]: [f64; 2]) -> bool {
+    /// Whether the initial value is a measure of the best one: not near zero beside it, and beyond its own error bar where that is known.
+    fn has_ratio(&self, own: [f64; 2]) -> bool {
         let bar = self.error_estimate.map_or(0.0, |errors| SAFETY * errors[0].abs());
-        best / initial > 0.0 && initial.abs() >= LEAST_START * best.abs() && initial.abs() > bar
+        !begins_near_zero(own) && own[0].abs() > bar
     }
 
     /// What is to be said of a gain that is confirmed.
     pub fn reservation(&self, objective: &ObjectiveResult) -> Option<&'static str> {
         match self.verdict? {
             Verdict::NotConfirmed => None,
-            Verdict::Confirmed if self.hides_gain(objective) => Some("smaller than its error bar"),
+            Verdict::Confirmed if self.hides_gain([objective.initial, objective.best]) => {
+                Some("smaller than its error bar")
+            }
             Verdict::Confirmed => objective
                 .is_violated_on_finer_mesh()
                 .then_some("of a shape that violates constraints on the finer mesh"),
@@ -213,15 +216,19 @@ impl Accuracy {
         if gain.is_nan() || gain.abs() < LEAST_GAIN || others.is_empty() {
             return;
         }
-        let is_near_zero = best / initial <= 0.0 || initial.abs() < LEAST_START * best.abs();
-        let has_ratio = self.has_ratio(own);
+        let (begins_near_zero, has_ratio) = (begins_near_zero(own), self.has_ratio(own));
         let is_left = others.iter().all(|[first, last]| {
             let (as_ratio, in_unit) = ((last / first - 1.0) / gain, (last - first) / (best - initial));
-            !is_near_zero && as_ratio >= LEAST_SHARE && in_unit >= LEAST_SHARE_IN_UNIT
+            !begins_near_zero && as_ratio >= LEAST_SHARE && in_unit >= LEAST_SHARE_IN_UNIT
                 || !has_ratio && in_unit >= LEAST_SHARE
         });
         self.verdict = Some(if is_left { Verdict::Confirmed } else { Verdict::NotConfirmed });
     }
+}
+
+/// Whether an initial value is next to nothing beside the best one, or has the other sign.
+fn begins_near_zero([initial, best]: [f64; 2]) -> bool {
+    best / initial <= 0.0 || initial.abs() < LEAST_START * best.abs()
 }
 
 /// The size of an error relative to a value; `None` where that is no number.
@@ -298,31 +305,17 @@ mod tests {
     /// The errors of both values differ by a seventh of the gain, whatever is left of the initial one.
     #[test]
     fn a_gain_from_near_zero_is_held_against_its_error_in_its_unit() {
-        let hidden = |[initial, best]: [f64; 2], errors: [f64; 2]| {
-            let objective = ObjectiveResult { initial, best, ratio: best / initial, ..objective() };
+        let hidden = |own: [f64; 2], errors: [f64; 2]| {
             let mut accuracy = Accuracy::default();
-            let corrected = accuracy.estimated([initial, best], errors);
-            accuracy.judge([initial, best], &[corrected]);
+            let corrected = accuracy.estimated(own, errors);
+            accuracy.judge(own, &[corrected]);
             assert_eq!(accuracy.verdict, Some(Verdict::Confirmed));
-            accuracy.hides_gain(&objective)
+            accuracy.hides_gain(own)
         };
         assert!(!hidden([3.648e-4, 2.4518e-3], [-2.94e-4, -8e-6]));
         assert!(!hidden([-3.9e-5, 2.498e-3], [3.1e-5, 4.2e-4]));
         assert!(hidden([-3.9e-5, 2.498e-3], [-1.3e-3, 4.2e-4]));
         assert!(hidden([1.0, 0.99], [-0.1, -0.11]));
-    }
-
-    fn objective() -> ObjectiveResult {
-        ObjectiveResult {
-            initial: 1.0,
-            best: 1.0,
-            ratio: 1.0,
-            best_evaluation: 1,
-            verified_ratio: None,
-            verification: None,
-            homogeneity: None,
-            terms: Vec::new(),
-        }
     }
 
     #[test]

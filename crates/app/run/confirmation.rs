@@ -255,7 +255,7 @@ impl Session<'_> {
                  surfaces leave out. Cure: {cure}, with smaller faces where they are curved"
             ));
         }
-        if accuracy.hides_gain(objective) {
+        if accuracy.hides_gain([objective.initial, objective.best]) {
             observer.warning(
                 "the gain of this run is smaller than its error bar: the checks have a gain as well, but how large it is stays \
                  open; a finer mesh tells",

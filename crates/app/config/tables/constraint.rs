@@ -20,8 +20,8 @@ use crate::config::value::range::Range;
 table! {
     /// What must keep within a bound while the objective is optimised; with the algorithms `mma`, `ccsaq` and `slsqp`, and
     /// with a `[design]`. A constraint counts as kept when it is beyond its bound by no more than a millionth of it, or of the
-    /// initial value where the bound is zero. The best design of a run is the best one that keeps all constraints; if none does, the one that is least beyond a bound, with a
-    /// warning.
+    /// initial value where the bound is zero. The best design of a run is the best one that keeps all constraints; if none does, the
+    /// one that is least beyond a bound, with a warning.
     ///
     /// The bounds on a thickness are on the safe side by a hundredth of them: the true least thickness is a little greater, the
     /// greatest a little smaller. A search keeps them as bounds on the variables or as linear limits at every node, up to a

@@ -30,7 +30,8 @@ table! {
         /// What the load is called in results and by `load`: letters, digits, `_` and `-`; each name once. Arrays of fields have it as
         /// suffix, but for those of the first load.
         name: String = COLUMN, need "\"nominal\"";
-        /// Its frequency [Hz]. Default: that of `[analysis]`, which then has one only. `[analysis]` has to have one where all loads have their own, too.
+        /// Its frequency [Hz]. Default: that of `[analysis]`, which then has one only. `[analysis]` has to have one where all loads
+        /// have their own, too.
         frequency: Option<f64> = quantity(Frequency, NOT_NEGATIVE);
         /// Factor on the currents and voltages of all coils under this load, not 0.
         #[also(not_zero)]

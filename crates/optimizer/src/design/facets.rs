@@ -77,6 +77,7 @@ mod tests {
         }
         assert_eq!(off(Control::Nodes, Vec::new(), &peak), None);
     }
+
     /// On a held rim the grid is not followed, nor between that and the next nodes, however fine the mesh is: nobody means that.
     #[test]
     fn facets_beside_a_held_rim_are_left_out_on_refined_meshes_too() {
