@@ -51,6 +51,7 @@ const BEYOND_A_SCHEMA: [(&str, &[&str]); 9] = [
             "has no volume",
             "is turned over",
             "the bounds cross",
+            "no value keeps both",
             "outside of the bounds",
             "the bounds leave out",
             "m at least and",

@@ -153,7 +153,7 @@ pub fn set_up_watched(
     }
     let at_bounds = skin::bound_warnings(config, &setup.audits, (&setup.problem, &setup.full_mesh));
     setup.warnings.extend(at_bounds);
-    setup.warnings.extend(thickness::cut_warning(config, &setup.problem));
+    setup.warnings.extend(thickness::cut_warning(config, setup.problem.shape(), &setup.full_mesh));
     Ok(setup)
 }
 

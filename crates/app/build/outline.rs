@@ -99,7 +99,7 @@ fn outline_design(
     let triangles = design::triangles(design, full_mesh)?;
     let topology = full_mesh.topology();
     let mut bodies = thickened_regions(full_mesh, &surface, config);
-    let thickness = WallThickness::measure(full_mesh, &bodies, &surface);
+    let thickness = WallThickness::measure(full_mesh, &bodies, &surface).ok();
     let has_entry = |region: &RegionId| config.regions.contains_key(&topology.region_names()[region.index()]);
     if bodies.is_empty() {
         bodies = regions_at(full_mesh, surface.nodes()).into_iter().filter(has_entry).collect();

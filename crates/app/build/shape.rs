@@ -289,7 +289,7 @@ pub(super) fn shape(
     }
     let bodies = thickened_regions(full_mesh, &full_surface, config);
     let thickness = WallThickness::measure(full_mesh, &bodies, &full_surface)
-        .and_then(|thickness| thickness.renumbered(&full_mesh.nodes_in(mesh)));
+        .map(|measured| measured.renumbered(full_mesh, &full_mesh.nodes_in(mesh)));
     let n = surface.variable_count();
     let initial = design.initial.values(n, design.lower, design.upper).unwrap_or_else(|| {
         let fault = source.diagnostic("design.initial", format!("design.initial has not {n} values"));
@@ -305,7 +305,7 @@ pub(super) fn shape(
         let fault = source.diagnostic("optimizer.minimum_quality", message);
         faults.push(fault.expected(format!("at most {quality:.3e}")));
     }
-    if let Some(thickness) = &thickness {
+    if let Ok(thickness) = &thickness {
         let doubt = unit_warning(config, full_mesh).map_or(String::new(), |doubt| format!("; {doubt}"));
         faults.extend(vanishing_faults(source, design, mesh, (&surface, thickness), &doubt));
     }

@@ -9,7 +9,7 @@ use fluxmorph_geometry::soundness::{
     Contact, Hull, Leaning, Meeting, OpenPatch, Situation, contacts, leaning_layers, open_patches,
     separate_parts,
 };
-use fluxmorph_geometry::tet4::{self, Point, area_vector, centroid, norm, sub};
+use fluxmorph_geometry::tet4::{self, Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Facet, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 
@@ -19,6 +19,9 @@ use crate::config::{self, Config, Diagnostic, MeshConfig, SourceMap};
 
 /// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
 const USUAL: [f64; 2] = [1e-3, 30.0];
+
+/// Share of the size of a mesh by which a node may be off a plane, and difference of the cosines of planes that are one.
+const PLANE: f64 = 1e-9;
 
 /// Share of a mesh that is air in devices with air around them.
 const MOSTLY: f64 = 0.75;
@@ -187,21 +190,88 @@ pub(super) fn normal(mesh: &Mesh, face: [NodeId; 3]) -> Point {
     unit(area_vector(face.map(|node| mesh.point(node))))
 }
 
-/// A design that moves a wall of a body which is no part of the mesh through another wall of it: elements do not notice.
-pub(crate) fn overlap_warning(config: &Config, full_mesh: &Mesh, moved: &Mesh) -> Option<String> {
-    let topology = full_mesh.topology();
-    let designed = faces_of(topology, config.design.as_ref()?.surface.iter().map(String::as_str));
-    let is_wall = |facet: &Facet| facet.outside.is_none() && designed.contains(&face_key(facet.nodes));
-    topology.facets().iter().any(is_wall).then_some(())?;
+/// A design that moves a wall of a body which is no part of the mesh, or is replaced by its surface, through another wall of it or through
+/// a flat side of the mesh, behind which its mirror image may lie: elements do not notice. The meshes are those that are solved on, before
+/// and after.
+pub(crate) fn overlap_warning(
+    config: &Config,
+    full_mesh: &Mesh,
+    [original, moved]: [&Mesh; 2],
+) -> Option<String> {
+    let solved = full_mesh.nodes_in(original);
+    let of_full = faces_of(full_mesh.topology(), config.design.as_ref()?.surface.iter().map(String::as_str));
+    let on_solved = |face: [NodeId; 3]| {
+        let [a, b, c] = face.map(|n| solved[n.index()]);
+        Some(face_key([a?, b?, c?]))
+    };
+    let designed: HashSet<[NodeId; 3]> = of_full.into_iter().filter_map(on_solved).collect();
+    let is_wall = |facet: &&Facet| facet.outside.is_none() && designed.contains(&face_key(facet.nodes));
+    let walls: Vec<[NodeId; 3]> =
+        original.topology().facets().iter().filter(is_wall).map(|facet| facet.nodes).collect();
+    if walls.is_empty() {
+        return None;
+    }
     let hull = Hull::new(moved);
     let found = contacts(&hull, &vec![false; hull.faces().len()]);
-    let overlap = found.iter().find(|contact| contact.meeting == Meeting::Overlapping)?;
+    let overlap = found.iter().find(|contact| contact.meeting == Meeting::Overlapping);
+    let what = match overlap {
+        Some(overlap) => format!(
+            "the design surface has passed through another wall at {}, and the mesh overlaps itself: nothing is left there of the body \
+             between them, and no number of this design means anything",
+            millimetres(overlap.place)
+        ),
+        None => format!(
+            "the design surface has passed beyond a flat side of the mesh at {}: where that is a plane of symmetry, the mesh overlaps its \
+             mirror image, nothing is left there of the body between them, and no number of this design means anything",
+            millimetres(beyond_a_side([original, moved], &walls)?)
+        ),
+    };
     Some(format!(
-        "the design surface has passed through another wall at {}, and the mesh overlaps itself: nothing is left there of the body \
-         between them, and no number of this design means anything; take bounds that leave some of it, or mesh the body as a \
-         region, with model = \"perfect\" or \"impedance\", of which bounds are checked",
-        millimetres(overlap.place)
+        "{what}; take bounds that leave some of it, or mesh the body as a region, with model = \"perfect\" or \"impedance\", of which \
+         bounds are checked where it has a thickness along the design's direction"
     ))
+}
+
+/// Where walls have gone farthest beyond a flat side that they begin at: one that has all of the mesh before it and none of these walls
+/// in it, and stays where it is.
+fn beyond_a_side([original, moved]: [&Mesh; 2], walls: &[[NodeId; 3]]) -> Option<Point> {
+    let rounding = PLANE * size(original);
+    let of_walls: BTreeSet<NodeId> = walls.iter().flatten().copied().collect();
+    let keys: HashSet<[NodeId; 3]> = walls.iter().copied().map(face_key).collect();
+    let beside = original.topology().facets().iter().filter(|facet| {
+        facet.outside.is_none()
+            && !keys.contains(&face_key(facet.nodes))
+            && facet.nodes.iter().any(|n| of_walls.contains(n))
+    });
+    let mut sides: Vec<(Point, f64)> = Vec::new();
+    for facet in beside {
+        let outwards = normal(original, facet.nodes);
+        let side = (outwards, dot(outwards, original.point(facet.nodes[0])));
+        let is_same =
+            |(n, at): &(Point, f64)| dot(*n, outwards) > 1.0 - PLANE && (at - side.1).abs() < rounding;
+        if !sides.iter().any(is_same) {
+            sides.push(side);
+        }
+    }
+    let mut farthest: Option<(f64, Point)> = None;
+    for (outwards, at) in sides {
+        let height = |mesh: &Mesh, n: NodeId| dot(outwards, mesh.point(n)) - at;
+        let is_in_it = |n: NodeId| height(original, n).abs() <= rounding;
+        let is_side = original.topology().nodes().all(|n| {
+            height(original, n) <= rounding
+                && (of_walls.contains(&n) || !is_in_it(n) || height(moved, n).abs() <= rounding)
+        });
+        if !is_side || walls.iter().any(|wall| wall.iter().all(|n| is_in_it(*n))) {
+            continue;
+        }
+        for &n in &of_walls {
+            let beyond = height(moved, n);
+            if beyond > farthest.map_or(rounding, |(most, _)| most) {
+                farthest = Some((beyond, moved.point(n)));
+            }
+        }
+    }
+    farthest.map(|(_, place)| place)
 }
 
 fn contact_fault(source: &SourceMap, mesh: &Mesh, contact: &Contact) -> Diagnostic {
@@ -294,28 +364,49 @@ mod tests {
     use super::*;
     use crate::build::build_mesh;
 
-    /// A plate of 10 mm that is left out of the mesh, and its lower face moved upwards.
-    #[test]
-    fn a_wall_that_passes_through_another_one_is_named() {
-        let text = "[mesh]\ngenerator = \"boxes\"\n[mesh.boxes]\nbox = [[0, 0, 0], [0.03, 0.03, 0.05]]\n\
-                    [[mesh.boxes.regions]]\nname = \"plate\"\nbox = [[0, 0, 0.02], [0.02, 0.02, 0.03]]\ncells = [2, 2, 1]\n\
-                    [[mesh.boxes.surfaces]]\nname = \"face\"\nbox = [[0, 0, 0.02], [0.02, 0.02, 0.02]]\n\
-                    [analysis]\nfrequency = 0\n[design]\nsurface = \"face\"\ndirection = [0, 0, 1]\nlower = 0\nupper = 0.02\n\
-                    [remesh]\nregion = \"air\"\n[objective]\nkind = \"energy\"\n";
-        let (config, source) = Config::from_str(text, "device.toml").expect("sound");
+    /// What is said of a plate of 10 mm from this height upwards that is left out of the mesh, and of which a face is moved.
+    fn said(plate: f64, face: f64, motion: f64) -> Option<String> {
+        let top = plate + 0.01;
+        let text = format!(
+            "[mesh]\ngenerator = \"boxes\"\n[mesh.boxes]\nbox = [[0, 0, 0], [0.03, 0.03, 0.05]]\n\
+             [[mesh.boxes.regions]]\nname = \"plate\"\nbox = [[0, 0, {plate}], [0.02, 0.02, {top}]]\ncells = [2, 2, 1]\n\
+             [[mesh.boxes.surfaces]]\nname = \"face\"\nbox = [[0, 0, {face}], [0.02, 0.02, {face}]]\n\
+             [analysis]\nfrequency = 0\n[design]\nsurface = \"face\"\ndirection = [0, 0, 1]\nlower = 0\nupper = 0.02\n\
+             [remesh]\nregion = \"air\"\n[objective]\nkind = \"energy\"\n"
+        );
+        let (config, source) = Config::from_str(&text, "device.toml").expect("sound");
         let whole = build_mesh(&config, &source).expect("a mesh");
-        let plate = whole.topology().region("plate").expect("a region");
-        let (mesh, _) = whole.without_region(plate).expect("air is left");
-        let moved = |height: f64| {
-            let place = |&[x, y, z]: &[f64; 3]| {
-                let is_of_face = (z - 0.02).abs() < 1e-9 && x < 0.019 && y < 0.019;
-                [x, y, if is_of_face { z + height } else { z }]
-            };
-            let points = mesh.points().iter().map(place).collect();
-            overlap_warning(&config, &mesh, &Mesh::new(mesh.topology().clone(), points).expect("sound"))
+        let region = whole.topology().region("plate").expect("a region");
+        let (mesh, _) = whole.without_region(region).expect("air is left");
+        let place = |&[x, y, z]: &[f64; 3]| {
+            let is_of_face = (z - face).abs() < 1e-9 && x < 0.019 && y < 0.019;
+            [x, y, if is_of_face { z + motion } else { z }]
         };
-        assert_eq!(moved(0.008), None);
-        let said = moved(0.012).expect("it is beyond the upper face");
-        assert!(said.contains("has passed through another wall at"), "{said}");
+        let points = mesh.points().iter().map(place).collect();
+        let moved = Mesh::new(mesh.topology().clone(), points).expect("sound");
+        // Of the mesh with the plate as well, where its surface replaces it.
+        let [left_out, replaced] =
+            [&mesh, &whole].map(|full| overlap_warning(&config, full, [&mesh, &moved]));
+        assert_eq!(left_out, replaced);
+        left_out
+    }
+
+    #[test]
+    fn a_wall_that_passes_through_another_one_or_a_side_is_named() {
+        for (plate, face, motion, expected) in [
+            (0.02, 0.02, 0.008, None),
+            (0.02, 0.02, 0.012, Some("has passed through another wall at")),
+            (0.0, 0.01, -0.008, None),
+            (
+                0.0,
+                0.01,
+                -0.012,
+                Some("has passed beyond a flat side of the mesh at (0.000, 0.000, -2.000) mm"),
+            ),
+        ] {
+            let said = said(plate, face, motion);
+            let is_expected = |text: &str| expected.is_some_and(|own| text.contains(own));
+            assert!(said.as_deref().map_or(expected.is_none(), is_expected), "{face} {motion}: {said:?}");
+        }
     }
 }

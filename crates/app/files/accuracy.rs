@@ -43,7 +43,7 @@ pub fn relative_bar(error: f64, value: f64) -> Option<f64> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 pub struct Accuracy {
     /// Estimated error of the ratio of a run, or of the objective of an analysis, relative to it; of a ratio at least a fiftieth of
-    /// the larger of the relative errors of its two values. `None` where there is no estimate.
+    /// the larger of the relative errors of its two values. `None` where there is no estimate, or no ratio.
     pub error_estimate_relative: Option<f64>,
     /// Estimated errors of the objective at the initial and at the best design, what the true value has more [its unit]; of an
     /// analysis both are the same.
@@ -201,7 +201,8 @@ impl Accuracy {
         let is_one_design = best == initial && errors[0] == errors[1];
         let uncancelled = if is_one_design { 0.0 } else { UNCANCELLED };
         let least = of_values.into_iter().flatten().fold(0.0, f64::max) * uncancelled;
-        self.error_estimate_relative = of_ratio.map(|error| error.max(least));
+        let has_ratio = self.has_ratio([initial, best]);
+        self.error_estimate_relative = of_ratio.filter(|_| has_ratio).map(|error| error.max(least));
         corrected
     }
 
@@ -340,5 +341,8 @@ mod tests {
         // One rounding of each of a few operations.
         assert!((error - 0.1).abs() < 1e-15, "{error}");
         assert_eq!(Accuracy::default().of_analysis(0.0, 1.0).error_estimate_relative, None);
+        // Of an initial value within its error bar there is no ratio, nor one of it.
+        accuracy.estimated([2.0, 1.0], [1.25, 0.1]);
+        assert_eq!((accuracy.error_estimate_relative, accuracy.error_estimate), (None, Some([1.25, 0.1])));
     }
 }

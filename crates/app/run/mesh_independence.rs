@@ -39,6 +39,9 @@ const MOST_EVALUATIONS: f64 = 25.0;
 /// the nodes of coarse cells a smooth shape is off by some percent.
 const LARGEST_DEVIATION: f64 = 0.1;
 
+/// Why they may be so far off.
+const WHY_FAR: &str = "as the control grid is finer than the cells of the surface, or bends within them";
+
 /// Share of the gain by which both ratios may be apart all the same.
 const LARGEST_DIFFERENCE: f64 = 0.1;
 
@@ -150,6 +153,10 @@ impl MeshIndependence<'_> {
                 self.compute_on_finer_elements(interrupted)
             }
         };
+        if !matches!(outcome, Ok(Outcome::Found(_))) {
+            let facets = self.shapes.facet_deviation().and_then(of_facets);
+            facets.iter().for_each(|facets| observer.notice(facets));
+        }
         match outcome {
             Ok(Outcome::Found(verification)) => {
                 for constraint in verification.violated() {
@@ -291,25 +298,39 @@ impl MeshIndependence<'_> {
 /// That the best shape is so far from what its control grid describes that another mesh has another one: on a fresh mesh, where the
 /// ratios of both differ, and on cut elements, which have the facets of the run.
 fn of_another_shape(found: &Verification, ratio: f64) -> Option<String> {
-    let ShapeDeviation { distance_m, motion_m } = found.deviation?;
-    let differs = (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs();
-    if distance_m <= LARGEST_DEVIATION * motion_m || found.mesh == VerificationMesh::Fresh && !differs {
-        return None;
+    let deviation = found.deviation?;
+    if found.mesh == VerificationMesh::Cut {
+        return of_facets(deviation).map(|facets| format!("{facets}; cut elements keep them"));
     }
-    let off = format!("up to {:.3} mm from", Millimetres(distance_m));
-    let motion = format!("of {:.3} mm of motion", Millimetres(motion_m));
-    let why = "as the control grid is finer than the cells of the surface, or bends within them";
-    Some(match found.mesh {
-        VerificationMesh::Fresh => format!(
-            "F/F0 on the fresh mesh, {}, is that of another shape: {off} that of the run, {motion}, {why}; with a coarser grid or smaller \
-             cells both have one shape",
-            show::ratio(found.ratio)
-        ),
-        VerificationMesh::Cut => format!(
-            "the facets of the best shape are {off} the surface that design.grid describes, {motion}, {why}; this check keeps them, and on \
-             another mesh the same variables are another shape, whose F/F0 may differ: take a coarser grid or smaller cells"
-        ),
+    let differs = (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs();
+    (differs && is_far(deviation)).then(|| {
+        format!(
+            "F/F0 on the fresh mesh, {}, is that of another shape: {} that of the run, {WHY_FAR}; with a coarser grid or smaller cells \
+             both have one shape",
+            show::ratio(found.ratio),
+            distance(deviation)
+        )
     })
+}
+
+/// That facets are so far from what a control grid describes that another mesh has another shape.
+fn of_facets(deviation: ShapeDeviation) -> Option<String> {
+    is_far(deviation).then(|| {
+        format!(
+            "the facets of the best shape are {} the surface that design.grid describes, {WHY_FAR}: on another mesh the same variables \
+             are another shape, whose F/F0 may differ; take a coarser grid or smaller cells",
+            distance(deviation)
+        )
+    })
+}
+
+fn is_far(ShapeDeviation { distance_m, motion_m }: ShapeDeviation) -> bool {
+    distance_m > LARGEST_DEVIATION * motion_m
+}
+
+fn distance(ShapeDeviation { distance_m, motion_m }: ShapeDeviation) -> String {
+    let [distance, motion] = [distance_m, motion_m].map(Millimetres);
+    format!("up to {distance:.3} mm, of {motion:.3} mm of motion, from")
 }
 
 /// The configuration without what belongs to its own mesh.

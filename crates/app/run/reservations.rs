@@ -71,7 +71,7 @@ pub(super) fn reservations(
     if problem.shape().is_some() {
         all.extend(multipole::warnings(config, problem, &analysis.mesh)?);
     }
-    all.extend(overlap_warning(config, &setup.full_mesh, &analysis.mesh));
+    all.extend(overlap_warning(config, &setup.full_mesh, [problem.original(), &analysis.mesh]));
     Ok(all)
 }
 

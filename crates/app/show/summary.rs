@@ -178,8 +178,16 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.extend(homogeneity(objective));
     rows.extend(objective.verification.as_ref().and_then(|found| verification(found, named, styles)));
     let Some(accuracy) = &result.accuracy else { return rows };
-    if let Some(error) = accuracy.error_estimate_relative {
-        rows.push(("error bar of F/F0", format!("± {:.1e} (estimated)", SAFETY * error * ratio.abs())));
+    let bar = |error: f64| format!("± {:.1e}", SAFETY * error.abs());
+    match (accuracy.error_estimate_relative, accuracy.error_estimate) {
+        (Some(error), _) => {
+            rows.push(("error bar of F/F0", format!("{} (estimated)", bar(error * ratio))));
+        }
+        (None, Some([first, last])) => {
+            let text = format!("{}{unit} initial, {}{unit} best (estimated)", bar(first), bar(last));
+            rows.push(("error bars", text));
+        }
+        (None, None) => {}
     }
     if let Some(is_within) = accuracy.within_tolerance {
         let verdict = if is_within { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
@@ -426,6 +434,9 @@ mod tests {
         }
         result.accuracy.as_mut().expect("it is there").error_estimate_relative = Some(0.6);
         assert!(of(&result).contains("but smaller than its error bar"), "{}", of(&result));
+        let accuracy = result.accuracy.as_mut().expect("it is there");
+        (accuracy.error_estimate_relative, accuracy.error_estimate) = (None, Some([1.0, -0.25]));
+        assert!(of(&result).contains("± 2.0e0 initial, ± 5.0e-1 best (estimated)"), "{}", of(&result));
     }
 
     #[test]

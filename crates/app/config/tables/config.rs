@@ -8,7 +8,7 @@ use super::accuracy::Accuracy;
 use super::analysis::Analysis;
 use super::boundary::Boundaries;
 use super::coil::{Coil, IN_SERIES};
-use super::constraint::{Constraint, Limit};
+use super::constraint::{Constraint, Limit, check_bounds};
 use super::design::Design;
 use super::force::ForceBody;
 use super::load::Load;
@@ -130,6 +130,7 @@ impl Config {
         self.check_functionals(root, is_known);
         let constraints = self.constraints.iter().map(|constraint| &constraint.name);
         root.named_twice("constraints", constraints, "constraints", "a different `name` for each constraint");
+        check_bounds(root, &self.constraints);
         // One of an unknown kind has no name.
         self.constraints.retain(|constraint| !constraint.name.is_empty());
         if let Some(mover) = ["design", "morph"].into_iter().find(|key| root.has(key))

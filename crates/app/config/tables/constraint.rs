@@ -242,6 +242,24 @@ impl Constraint {
     }
 }
 
+/// Bounds on one functional that no value keeps.
+pub(super) fn check_bounds(root: &Section<'_>, constraints: &[Constraint]) {
+    for (second, Constraint { limit, .. }) in constraints.iter().enumerate() {
+        let Limit::Functional { functional, bound } = limit else { continue };
+        let path = |index: usize, bound: ValueBound| format!("constraints[{index}].{}", bound.key());
+        for (first, other) in constraints[..second].iter().enumerate() {
+            if let Limit::Functional { functional: of_other, bound: other } = &other.limit
+                && of_other == functional
+                && bound.opposes(*other)
+            {
+                let [other, own] = [path(first, *other), path(second, *bound)];
+                let message = format!("no value keeps both `{other}` and `{own}`");
+                root.clash([&other, &own], message, "bounds that one value can keep");
+            }
+        }
+    }
+}
+
 impl Group for Limit {
     type Written = LimitKeys;
 
@@ -311,7 +329,7 @@ impl Limit {
             (kind.limits(), bound)
             && (value < least || value > most)
         {
-            let key = if matches!(bound, ValueBound::AtMost(_)) { "upper" } else { "lower" };
+            let key = bound.key();
             let message = format!(
                 "`{}.{key}` is {value}, which is out of range for the kind `{}`",
                 section.path(),
@@ -342,6 +360,26 @@ impl Limit {
 }
 
 impl ValueBound {
+    fn key(self) -> &'static str {
+        match self {
+            Self::AtMost(_) => "upper",
+            Self::AtMostRatio(_) => "upper_ratio",
+            Self::AtLeast(_) => "lower",
+            Self::AtLeastRatio(_) => "lower_ratio",
+        }
+    }
+
+    /// Whether no value keeps both.
+    fn opposes(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::AtMost(most), Self::AtLeast(least))
+            | (Self::AtLeast(least), Self::AtMost(most))
+            | (Self::AtMostRatio(most), Self::AtLeastRatio(least))
+            | (Self::AtLeastRatio(least), Self::AtMostRatio(most)) => least > most,
+            _ => false,
+        }
+    }
+
     fn of(ratios: [Option<f64>; 2], section: &Section<'_>, dimension: Dimension, range: Range) -> Self {
         let [upper, lower] = ["upper", "lower"].map(|key| section.read(key, &quantity(dimension, range)));
         let example = format!("upper = \"{}\", or upper_ratio = 0.9", dimension.example());

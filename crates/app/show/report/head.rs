@@ -107,8 +107,16 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
         (Verdict::Confirmed, None) => "confirmed",
         (Verdict::Confirmed, Some(reservation)) => reservation,
     };
-    let bar = accuracy.error_estimate_relative.map(|error| SAFETY * error * objective.ratio.abs());
-    let bar = bar.map(|bar| format!("F / F₀ = {} ± {}", ticks::ratio(objective.ratio), number(bar, 2)));
+    let bar = |error: f64| number(SAFETY * error.abs(), 2);
+    let bar = match (accuracy.error_estimate_relative, accuracy.error_estimate) {
+        (Some(error), _) => {
+            Some(format!("F / F₀ = {} ± {}", ticks::ratio(objective.ratio), bar(error * objective.ratio)))
+        }
+        (None, errors) => errors.map(|[first, last]| {
+            format!("F₀ = {} ± {}", number(objective.initial, 4), bar(first))
+                + &format!(", F = {} ± {}", number(objective.best, 4), bar(last))
+        }),
+    };
     let other = accuracy.cross_check.as_ref().map(|check| {
         let CrossCheck { elements, order, ratio, by_estimate, .. } = check;
         let source = if *by_estimate { ", by the estimate" } else { "" };

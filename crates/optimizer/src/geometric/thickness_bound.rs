@@ -73,7 +73,7 @@ impl ThicknessBound {
     /// # Errors
     /// [`NoThickness`] where the shape has none.
     pub fn new(shape: &Shape, bound: ThicknessLimit) -> Result<Self, NoThickness> {
-        let thickness = shape.thickness().ok_or(NoThickness)?;
+        let thickness = shape.measured_thickness()?;
         let (ThicknessLimit::Minimum(limit) | ThicknessLimit::Maximum(limit)) = bound;
         // Two at least, as ln 1 = 0.
         let counted = thickness.walls(|_| [0.0; 3]).filter(|(_, wall)| counts(bound, wall));
@@ -141,7 +141,7 @@ impl ThicknessBound {
                 ThicknessLimit::Maximum(limit) => (-1.0, limit - kept_back(limit) - initial),
             };
             let mut slopes: BTreeMap<usize, f64> = BTreeMap::new();
-            for (node, derivative) in wall.derivatives {
+            for (node, derivative) in wall.derivatives.into_iter().flatten() {
                 let Ok(place) = surface.nodes().binary_search(&node) else {
                     // Along its own plane a node may slide.
                     let part = map.unknown_part(node, derivative);
@@ -192,7 +192,7 @@ impl ThicknessBound {
         let sum: f64 = terms.iter().sum();
         let mut nodal = vec![[0.0; 3]; mesh.points().len()];
         for ((wall, _), term) in excess.iter().zip(&terms) {
-            for (node, derivative) in wall.derivatives {
+            for (node, derivative) in wall.derivatives.into_iter().flatten() {
                 for (total, d) in nodal[node.index()].iter_mut().zip(derivative) {
                     *total += sign * term / sum * d;
                 }
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn a_wall_before_a_node_opposite_counts_where_it_is_beyond_what_is_kept_back() {
-        let wall = |bulge| Wall { thickness: 1.0, derivatives: [(NodeId(0), [0.0; 3]); 4], bulge };
+        let wall = |bulge| Wall { thickness: 1.0, derivatives: [Some((NodeId(0), [0.0; 3])); 4], bulge };
         let (least, most) = (ThicknessLimit::Minimum(0.5), ThicknessLimit::Maximum(0.5));
         for (bulge, of_least, of_most) in [
             (None, true, true),

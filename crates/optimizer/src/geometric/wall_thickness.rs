@@ -25,6 +25,7 @@ use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
 use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
+use super::NoThickness;
 use crate::design::DesignSurface;
 
 /// Sine of the angle (six degrees) between ray and triangle below which the triangle belongs to the body's side: facets of a
@@ -37,16 +38,35 @@ const ROUNDING: f64 = 1e-6;
 /// Most steps from the direction at one design node to that where a ray from opposite leaves the body.
 const MOST_TURNS: usize = 5;
 
+/// A corner of a wall.
+#[derive(Clone, Copy, Debug)]
+enum Corner {
+    /// A node of the mesh.
+    Node(NodeId),
+    /// A place that stays [m]: of a node of the mesh that was measured which the one that is solved on does not have, within the faces
+    /// in which a plane of symmetry cuts a region that its surface replaces.
+    Still(Point),
+}
+
+impl Corner {
+    fn node(self) -> Option<NodeId> {
+        match self {
+            Self::Node(node) => Some(node),
+            Self::Still(_) => None,
+        }
+    }
+}
+
 /// What lies opposite of a node on the undeformed mesh.
 #[derive(Clone, Copy, Debug)]
 struct Opposite {
     /// Distance [m].
     distance: f64,
-    /// The node.
-    node: NodeId,
-    /// The triangle there.
-    nodes: [NodeId; 3],
-    /// The weights of its nodes.
+    /// The node, and the corners of the triangle there.
+    corners: [Corner; 4],
+    /// The triangle, of the mesh that was measured.
+    face: [NodeId; 3],
+    /// The weights of its corners.
     weights: Point,
     /// `n / (n·d)`: what the thickness grows by with the place of the node.
     growth: Point,
@@ -61,7 +81,9 @@ impl Opposite {
     fn new(node: NodeId, hit: &Hit, outwards: Point, (nodes, body): ([NodeId; 3], RegionId)) -> Self {
         let &Hit { distance, weights, normal } = hit;
         let growth = normal.map(|c| c / dot(normal, outwards));
-        Self { distance, node, nodes, weights, growth, body, bulge: None }
+        let [a, b, c] = nodes;
+        let corners = [node, a, b, c].map(Corner::Node);
+        Self { distance, corners, face: nodes, weights, growth, body, bulge: None }
     }
 }
 
@@ -70,8 +92,8 @@ impl Opposite {
 pub struct Wall {
     /// Its thickness [m].
     pub thickness: f64,
-    /// Derivatives with respect to the positions of the node and of the three nodes opposite.
-    pub derivatives: [(NodeId, Point); 4],
+    /// Derivatives with respect to the positions of the node and of the three nodes opposite; none for what stays.
+    pub derivatives: [Option<(NodeId, Point)>; 4],
     /// By how much the body was thinner here than the design nodes around say, on the undeformed mesh [m]; `None` behind a design node.
     pub bulge: Option<f64>,
 }
@@ -85,10 +107,13 @@ pub struct WallThickness {
 }
 
 impl WallThickness {
-    /// Measures the bodies of the undeformed mesh, each behind its own part of the design surface; `None` where some ray does not meet
-    /// an opposite face of its body. Only at the rim of the design surface it may: where the body ends beside it, a direction that leans
-    /// outwards by as little as facets of a round face do leads past the body or out through its side, and the node has no thickness.
-    pub fn measure(mesh: &Mesh, bodies: &[RegionId], surface: &DesignSurface) -> Option<Self> {
+    /// Measures the bodies of the undeformed mesh, each behind its own part of the design surface.
+    ///
+    /// # Errors
+    /// [`NoThickness`] without a body, and where some ray does not meet an opposite face of its body. Only at the rim of the design
+    /// surface it may: where the body ends beside it, a direction that leans outwards by as little as facets of a round face do leads
+    /// past the body or out through its side, and the node has no thickness.
+    pub fn measure(mesh: &Mesh, bodies: &[RegionId], surface: &DesignSurface) -> Result<Self, NoThickness> {
         let of: BTreeMap<RegionId, BodyFaces> =
             bodies.iter().map(|&region| (region, BodyFaces::new(mesh, region, surface))).collect();
         let mut behind: HashMap<NodeId, BTreeSet<RegionId>> = HashMap::new();
@@ -102,7 +127,7 @@ impl WallThickness {
         }
         let opposite_of = |(&node, direction): (&NodeId, &Point)| {
             if *direction == [0.0; 3] {
-                return Some(Vec::new());
+                return Ok(Vec::new());
             }
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
@@ -120,25 +145,32 @@ impl WallThickness {
                 found.extend(beside.map(|(region, _)| *region).find_map(in_body));
             }
             let may_have_none = || of.values().any(|faces| faces.are_at_rim(node));
-            (!found.is_empty() || may_have_none()).then_some(found)
+            let is_whole = !found.is_empty() || may_have_none();
+            let at = (!of.is_empty()).then_some(origin);
+            if is_whole { Ok(found) } else { Err(NoThickness { at }) }
         };
         let nodes = surface.nodes().iter().zip(surface.directions());
-        let by_node = nodes.map(opposite_of).collect::<Option<Vec<_>>>()?;
+        let by_node = nodes.map(opposite_of).collect::<Result<Vec<_>, _>>()?;
         let with_place = |(i, found): (usize, Vec<Opposite>)| found.into_iter().map(move |own| (i, own));
         let mut opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(with_place).collect();
         let facing: Vec<_> = of.values().flat_map(|own| own.facing(mesh, surface, &opposite)).collect();
         opposite.extend(facing);
         opposite.sort_by_key(|&(place, _)| place);
-        (!opposite.is_empty()).then_some(Self { opposite })
+        if opposite.is_empty() { Err(NoThickness::default()) } else { Ok(Self { opposite }) }
     }
 
-    /// The same on a mesh in which every node has another number; `None` where it lacks one of them.
-    pub fn renumbered(&self, new_of: &[Option<NodeId>]) -> Option<Self> {
-        let renumber = |(place, own): &(usize, Opposite)| {
-            let [a, b, c] = own.nodes.map(|n| new_of[n.index()]);
-            Some((*place, Opposite { node: new_of[own.node.index()]?, nodes: [a?, b?, c?], ..*own }))
+    /// The same on another mesh, in which the nodes of the one that was measured have these numbers; those that it lacks stay.
+    pub fn renumbered(&self, measured: &Mesh, new_of: &[Option<NodeId>]) -> Self {
+        let renumber = |corner: Corner| match corner {
+            Corner::Node(n) => {
+                new_of[n.index()].map_or_else(|| Corner::Still(measured.point(n)), Corner::Node)
+            }
+            still @ Corner::Still(_) => still,
         };
-        Some(Self { opposite: self.opposite.iter().map(renumber).collect::<Option<_>>()? })
+        let of = |(place, own): &(usize, Opposite)| {
+            (*place, Opposite { corners: own.corners.map(renumber), ..*own })
+        };
+        Self { opposite: self.opposite.iter().map(of).collect() }
     }
 
     /// Initial thickness [m] of every wall, with the place in the design surface of its node or of the nearest one.
@@ -146,15 +178,19 @@ impl WallThickness {
         self.opposite.iter().map(|(i, opposite)| (*i, opposite.distance))
     }
 
-    /// The triangles opposite of all design nodes.
+    /// The triangles opposite of all design nodes, of the mesh that was measured.
     pub fn opposite_faces(&self) -> impl Iterator<Item = [NodeId; 3]> + '_ {
-        self.opposite.iter().filter(|(_, own)| own.bulge.is_none()).map(|(_, own)| own.nodes)
+        self.opposite.iter().filter(|(_, own)| own.bulge.is_none()).map(|(_, own)| own.face)
     }
 
     /// The nodes opposite of the design surface, some of them several times.
     pub fn opposite_nodes(&self) -> impl Iterator<Item = NodeId> + '_ {
-        let facing = self.opposite.iter().filter(|(_, own)| own.bulge.is_some()).map(|(_, own)| own.node);
-        self.opposite_faces().flatten().chain(facing)
+        let of = |(_, own): &(usize, Opposite)| {
+            let [node, a, b, c] = own.corners;
+            // Before a node opposite the triangle is that of the design.
+            if own.bulge.is_some() { vec![node] } else { vec![a, b, c] }
+        };
+        self.opposite.iter().flat_map(of).filter_map(Corner::node)
     }
 
     /// All walls, with the place in the design surface of their node or of the nearest one, where every node of the mesh is at `place`
@@ -207,11 +243,15 @@ fn least_of<K: Ord>(walls: impl Iterator<Item = (K, Wall)>) -> BTreeMap<K, f64> 
 
 /// The wall between a node and what lies opposite.
 fn wall(opposite: &Opposite, place: &impl Fn(NodeId) -> Point) -> Wall {
-    let Opposite { node, nodes: [a, b, c], weights, growth, bulge, .. } = *opposite;
+    let Opposite { corners: [node, a, b, c], weights, growth, bulge, .. } = *opposite;
     let terms = [(node, 1.0), (a, -weights[0]), (b, -weights[1]), (c, -weights[2])];
+    let at = |corner: Corner| match corner {
+        Corner::Node(n) => place(n),
+        Corner::Still(point) => point,
+    };
     Wall {
-        thickness: terms.iter().map(|&(n, weight)| weight * dot(growth, place(n))).sum(),
-        derivatives: terms.map(|(n, weight)| (n, growth.map(|c| weight * c))),
+        thickness: terms.iter().map(|&(corner, weight)| weight * dot(growth, at(corner))).sum(),
+        derivatives: terms.map(|(corner, weight)| corner.node().map(|n| (n, growth.map(|c| weight * c)))),
         bulge,
     }
 }
@@ -274,7 +314,8 @@ impl BodyFaces {
         behind: &[(usize, Opposite)],
     ) -> Vec<(usize, Opposite)> {
         let own = behind.iter().filter(|(_, own)| own.body == self.body);
-        let distances: HashMap<NodeId, f64> = own.map(|(_, own)| (own.node, own.distance)).collect();
+        let distances: HashMap<NodeId, f64> =
+            own.map(|(place, own)| (surface.nodes()[*place], own.distance)).collect();
         let place_of = |node: NodeId| surface.nodes().binary_search(&node).expect("it was measured from");
         let mut measured: Vec<NodeId> = distances.keys().copied().collect();
         measured.sort_unstable();

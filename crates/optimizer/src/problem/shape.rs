@@ -6,7 +6,7 @@ use fluxmorph_remesh::{Carried, Motion, Moved, RemeshError};
 use super::finite;
 use crate::design::DesignSurface;
 use crate::error::Error;
-use crate::geometric::WallThickness;
+use crate::geometric::{NoThickness, WallThickness};
 
 /// Steps at most towards the carried designs; what is left then is cut off the way from a carried one.
 const MOST_PUSHES: usize = 20;
@@ -18,7 +18,7 @@ pub struct Shape {
     motion: Motion,
     /// Least quality (Eq. 4) of an element that may move, of a design that is evaluated.
     pub least_quality: f64,
-    thickness: Option<WallThickness>,
+    thickness: Result<WallThickness, NoThickness>,
     lower: Vec<f64>,
     upper: Vec<f64>,
     initial: Vec<f64>,
@@ -34,12 +34,12 @@ impl Shape {
         let [lower, upper] = bounds;
         check_bounds(&surface, &lower, &upper);
         let initial = lower.iter().zip(&upper).map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
-        Self { surface, motion, least_quality, thickness: None, lower, upper, initial }
+        Self { surface, motion, least_quality, thickness: Err(NoThickness::default()), lower, upper, initial }
     }
 
     /// The same with the thickness of the designed bodies.
     #[must_use]
-    pub fn with_thickness(self, thickness: Option<WallThickness>) -> Self {
+    pub fn with_thickness(self, thickness: Result<WallThickness, NoThickness>) -> Self {
         Self { thickness, ..self }
     }
 
@@ -83,7 +83,15 @@ impl Shape {
 
     /// Thickness of the designed bodies, where they have one.
     pub fn thickness(&self) -> Option<&WallThickness> {
-        self.thickness.as_ref()
+        self.thickness.as_ref().ok()
+    }
+
+    /// The same, or why there is none.
+    ///
+    /// # Errors
+    /// [`NoThickness`].
+    pub fn measured_thickness(&self) -> Result<&WallThickness, NoThickness> {
+        self.thickness.as_ref().map_err(|why| *why)
     }
 
     /// Lower bound of every variable [m].

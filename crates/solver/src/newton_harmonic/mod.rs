@@ -21,7 +21,7 @@ use crate::bh::{PhasorLaw, Tangent};
 use crate::circuit::{Equations, Excitation, SolidRows};
 use crate::element::Complex3;
 use crate::element::tensor::MOST_POINTS;
-use crate::error::{NonConvergence, SolverError};
+use crate::error::{NewtonFailure, NonConvergence, SolverError};
 use crate::linear::gmres::{self, Ended};
 use crate::linear::{Left, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
@@ -31,6 +31,8 @@ use crate::solution::FieldSolution;
 use crate::tangents::Tangents;
 
 mod search;
+
+use search::Measure;
 
 /// Elements whose integrals are held at once: some megabytes.
 const CHUNK: usize = 8192;
@@ -398,7 +400,24 @@ pub(crate) fn solve(
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
     let problem = Problem::new(model, mesh);
-    let settings = &model.setup().linear_solver;
+    let measure = Measure::of(problem.circuits.as_ref());
+    match descend(&problem, measure, (systems, start), observer) {
+        // What steps ask for may lead astray as well: from the same start again.
+        Err(SolverError::Newton { failure: NewtonFailure::Law, .. }) if measure == Measure::Asked => {
+            descend(&problem, Measure::Residual, (systems, start), observer)
+        }
+        ended => ended,
+    }
+}
+
+/// Newton's method with steps of which this becomes shorter.
+fn descend(
+    problem: &Problem<'_>,
+    measure: Measure,
+    (systems, start): (&mut StepSystems<'_>, Option<&[c64]>),
+    observer: &mut NewtonObserver<'_>,
+) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+    let settings = &problem.model.setup().linear_solver;
     let mut descent = Descent::new(settings.tolerance);
     let (mut iterate, mut iterations, mut steps) = match start {
         Some(values) => (problem.at(values.to_vec()), 0, 0),
@@ -434,8 +453,11 @@ pub(crate) fn solve(
         let (step, LinearSolverReport { iterations: own, .. }) =
             tangent.invert(Side::State, &right_side, &mut system, tolerance)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
-        let found =
-            if goes_on { problem.search_from(&iterate, &step, (&tangent, &mut system))? } else { None };
+        let found = if goes_on {
+            problem.search_from(&iterate, &step, measure, (&tangent, &mut system))?
+        } else {
+            None
+        };
         let Some((next, length)) = found else {
             let left = [&iterate.values[..], &right_side, &step];
             let is_state = worst <= settings.required && problem.is_rounding(left, (&system, systems));

@@ -18,6 +18,23 @@ const ARMIJO: f64 = 1e-4;
 /// The same where the residual is measured by the step that it asks for.
 const NATURAL: f64 = 0.25;
 
+/// What has to become shorter along a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Measure {
+    /// What the derivative at the start makes of the residual (the natural monotonicity of P. Deuflhard, Newton Methods for Nonlinear
+    /// Problems, chapter 3), or, as it may at turning points, does not, and the residual decides.
+    Asked,
+    /// The residual.
+    Residual,
+}
+
+impl Measure {
+    /// The first choice: where a capacitance is in series the residual is no error of a field.
+    pub(super) fn of(circuits: Option<&Equations>) -> Self {
+        if circuits.is_some_and(Equations::have_capacitance) { Self::Asked } else { Self::Residual }
+    }
+}
+
 impl Problem<'_> {
     /// A length of a step that lowers the residual, first the one at which it has next to no part along the step: a new iterate with
     /// it. The residual is measured by `Re rᴴS⁻¹r` with the matrix `S` that is nearest to the derivative, as an error of the field:
@@ -53,16 +70,15 @@ impl Problem<'_> {
         Ok(None)
     }
 
-    /// A length of Newton's own step. Where a capacitance is in series the residual is no error of a field: what the derivative at the
-    /// start makes of the residual has to become shorter (the natural monotonicity of P. Deuflhard, Newton Methods for Nonlinear
-    /// Problems, chapter 3), or, as it may at turning points, does not, and the residual decides.
+    /// A length of Newton's own step.
     pub(super) fn search_from(
         &self,
         from: &Iterate,
         step: &[c64],
+        measure: Measure,
         (tangent, nearest): (&HarmonicTangent, &mut PreparedSystem),
     ) -> Result<Option<(Iterate, f64)>, SolverError> {
-        if !self.circuits.as_ref().is_some_and(Equations::have_capacitance) {
+        if measure == Measure::Residual {
             return self.search(from, step, nearest);
         }
         let before = norm(step);

@@ -1,6 +1,7 @@
 use super::*;
 use crate::design::{DesignSetup, Direction};
 use fluxmorph_geometry::generate::{BoxRegion, BoxesParameters, ShieldParameters, boxes, shield};
+use fluxmorph_geometry::tet4::add;
 
 #[test]
 fn the_plate_is_ten_millimetres_thick_at_every_node() {
@@ -19,6 +20,28 @@ fn the_plate_is_ten_millimetres_thick_at_every_node() {
     };
     let thick: Vec<f64> = thickness.walls(held).map(|(_, wall)| wall.thickness).collect();
     assert!(thick.len() == surface.nodes().len() && thick.iter().all(|t| (t - 0.011).abs() < 1e-12));
+}
+
+/// Against a direction into the body there is none: what says so names a node inside of the surface.
+#[test]
+fn a_node_with_nothing_opposite_is_named() {
+    let (corners, face) = ([[0.0, 0.0, 0.0], [1.0, 1.0, 0.5]], 0.5);
+    let mesh = parts([[-1.0, -1.0, -1.0], [2.0, 2.0, 2.0]], 0.5, &[("body", corners)]);
+    let body = mesh.topology().region("body").expect("it has one");
+    let top = |n: &NodeId| {
+        let [x, y, z] = mesh.point(*n);
+        (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y) && z == face
+    };
+    let all = mesh.topology().facets().iter().map(|facet| facet.nodes);
+    let faces: Vec<[NodeId; 3]> = all.filter(|face| face.iter().all(top)).collect();
+    for (direction, expected) in [(1.0, None), (-1.0, Some([0.5, 0.5, 0.5]))] {
+        let setup = DesignSetup::new(&faces, Direction::Along([0.0, 0.0, direction]));
+        let surface = DesignSurface::new(&mesh, &setup).expect("every node is a variable");
+        let measured = WallThickness::measure(&mesh, &[body], &surface);
+        assert_eq!(measured.err().map(|why| why.at), expected.map(Some), "{direction}");
+    }
+    let why = NoThickness { at: Some([0.5, 0.5, 0.5]) }.to_string();
+    assert!(why.contains("at (500, 500, 500) mm has no face of a body opposite"), "{why}");
 }
 
 /// Boxes with names in one of air.
@@ -89,9 +112,32 @@ fn every_body_has_its_own_thickness() {
             let least = thickness.least_of_bodies(|n| mesh.point(n));
             let of = |name: &str| least[&mesh.topology().region(name).expect("it has both")];
             assert!((of("thin") - 0.1).abs() < 1e-12 && (of("thick") - 0.2).abs() < 1e-12);
-            assert!(WallThickness::measure(&mesh, &[], &surface).is_none());
+            assert!(WallThickness::measure(&mesh, &[], &surface).is_err_and(|why| why.at.is_none()));
         }
     }
+}
+
+/// Where a plane of symmetry cuts a body that its surface replaces, the mesh that is solved on has no nodes within the cut.
+#[test]
+fn what_lies_opposite_and_is_not_solved_on_stays_where_it_is() {
+    let mesh = layers(&[("plate", [0.0, 0.1])]);
+    let surface = faces_at(&mesh, &[0.0], Direction::Along([0.0, 0.0, -1.0]));
+    let plate = mesh.topology().region("plate").expect("it has one");
+    let measured = WallThickness::measure(&mesh, &[plate], &surface).expect("it has two faces");
+    let is_opposite = |n: NodeId| (mesh.point(n)[2] - 0.1).abs() < 1e-12;
+    let new_of: Vec<_> = mesh.topology().nodes().map(|n| (!is_opposite(n)).then_some(n)).collect();
+    let thickness = measured.renumbered(&mesh, &new_of);
+    let lower = |n: NodeId| {
+        assert!(!is_opposite(n), "it is not asked for");
+        add(mesh.point(n), [0.0, 0.0, -0.02])
+    };
+    for (_, wall) in thickness.walls(lower) {
+        assert!((wall.thickness - 0.12).abs() < 1e-12, "{}", wall.thickness);
+        assert_eq!(wall.derivatives.iter().flatten().count(), 1);
+    }
+    assert_eq!(thickness.walls(lower).count(), surface.nodes().len());
+    assert_eq!(thickness.opposite_nodes().count(), 0);
+    assert!(thickness.opposite_faces().flatten().all(is_opposite));
 }
 
 /// Plates side by side under one face: a node of both has the thickness of each.
@@ -208,7 +254,7 @@ fn a_dent_between_the_rays_is_measured_from_its_own_node() {
     let said = 0.55 * (1.0 - heights[0]) + 0.45 * (1.0 - heights[1]);
     let bulge = (said - (1.0 - depth)) * along;
     assert!((wall.bulge.expect("it was filtered") - bulge).abs() < 1e-12, "{:?} {bulge}", wall.bulge);
-    assert!(is_dent(&flat.point(wall.derivatives[0].0)));
+    assert!(is_dent(&flat.point(wall.derivatives[0].expect("a node").0)));
     assert!(mesh.point(surface.nodes()[place])[0] >= 0.5);
     assert!((thickness.range(&mesh).0 - wall.thickness).abs() < 1e-15);
     // Heights that are linear in the place: what is above the dent is what they are there.
@@ -249,10 +295,11 @@ fn a_wall_has_its_derivative_in_all_four_nodes_and_none_by_the_turn_of_a_triangl
     let growth = [0.1, -0.2, 1.1];
     let nodes = [1, 2, 3].map(NodeId);
     let weights = [0.5, 0.2, 0.3];
-    let opposite =
-        Opposite { distance: 1.0, node: NodeId(0), nodes, weights, growth, body: RegionId(0), bulge: None };
+    let corners = [0, 1, 2, 3].map(NodeId).map(Corner::Node);
+    let body = RegionId(0);
+    let opposite = Opposite { distance: 1.0, corners, face: nodes, weights, growth, body, bulge: None };
     let at = |places: &[Point; 4]| wall(&opposite, &|n| places[n.index()]);
-    for (k, (own, derivative)) in at(&places).derivatives.into_iter().enumerate() {
+    for (k, (own, derivative)) in at(&places).derivatives.into_iter().flatten().enumerate() {
         assert_eq!(own, NodeId::new(k));
         for d in 0..3 {
             let shifted = |h: f64| {
