@@ -146,7 +146,7 @@ fn what_facets_change_is_what_a_closed_form_has_more() {
     let sets = [far, "objective={kind=\"loss\", region=\"sphere\"}", "accuracy.estimate=true"];
     let sphere = sets.iter().fold(shipped("sphere", &[]), |device, set| device.with(set));
     finish(&mut sphere.command("solve", &out))
-        .says(&["on it in the mean they change the objective by about +3."]);
+        .says(&["on these in the mean, change the objective by about +3."]);
     let result = read_json(&out.join("result.json"));
     // An eighth of the loss in tests/reference/sphere.json.
     let missing = 23346.0 / 8.0 - number(&result, "/objective/best");
@@ -417,12 +417,15 @@ fn a_conductor_that_has_more_loss_than_its_surface_is_named() {
         let device = sets.iter().fold(shipped("shield_quick", &[]), |device, set| device.with(set));
         finish(&mut device.command("solve", &home.path().join(name))).completed().stderr
     };
-    let copper =
-        said("copper", &["materials.steel.relative_permeability=1", "materials.steel.conductivity=5.8e7"]);
-    assert!(
-        copper.contains("% more loss at 60 Hz than its impedance surface, mostly at its sharp edges"),
-        "{copper}"
-    );
+    let of_copper = ["materials.steel.relative_permeability=1", "materials.steel.conductivity=5.8e7"];
+    let forces = "forces=[{name=\"plate\",regions=[\"plate\"]}]";
+    let copper = said("copper", &[&of_copper[..], &[forces]].concat());
+    for words in [
+        "% more loss at 60 Hz than its impedance surface, mostly at its sharp edges",
+        "force and torque on it",
+    ] {
+        assert!(copper.contains(words), "{words}: {copper}");
+    }
     assert!(!said("steel", &[]).contains("its impedance surface"));
 }
 

@@ -152,3 +152,22 @@ fn the_thickness_of_a_body_that_a_plane_halves_is_said_to_be_that_of_the_half() 
     let left_out = "constraints on the shape are not looked at on a refined mesh: `thickness`";
     assert!(solved.stderr.contains(left_out), "{}", solved.stderr);
 }
+
+/// The same block as a perfect conductor, two cells thick: the mesh that is solved on has no nodes within the cut.
+#[test]
+fn bounds_of_a_body_that_its_surface_replaces_leave_some_of_it_where_a_plane_cuts_it() {
+    let home = folder();
+    let check = |lower: &str| {
+        let changes = [
+            ("material = \"iron\"", "material = \"iron\"\nmodel = \"perfect\""),
+            ("kind = \"energy\"\nregion = \"block\"", "kind = \"energy\""),
+            ("lower = \"-1 mm\"", lower),
+        ];
+        let path = home.path().join("replaced.toml");
+        std::fs::write(&path, changed(HALVED, &changes)).expect("a configuration");
+        finish(&mut command(&[&"check", &path]))
+    };
+    let said = ["49 of 49 design nodes ends at `z_min`, at the outside of the mesh", "5.000 to 5.000 mm"];
+    check("lower = \"-1 mm\"").with(0, &said);
+    check("lower = \"-6 mm\"").with(3, &["the body is 5.000 mm thick", "nothing would be left of it"]);
+}

@@ -369,7 +369,7 @@ fn kept(
     if !beyond.is_empty() {
         let cure = match kept {
             Kept::ButForUnrefined if of_surfaces == [0.0; 2] => {
-                "; no refinement takes the facets away, but a mesh with smaller faces there"
+                "; no refinement takes the facets away, but a mesh with smaller faces on curved surfaces"
             }
             Kept::ButForUnrefined if of_facets == [0.0; 2] => {
                 "; no refinement takes that away, but meshing the regions that are surfaces"

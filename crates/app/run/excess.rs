@@ -16,12 +16,12 @@ use fluxmorph_solver::{Boundary, FieldModel, FieldSolution};
 
 use super::Session;
 use super::reported::under;
-use crate::config::ObjectiveKind;
+use crate::config::{Config, ObjectiveKind};
 use crate::files::{LEAST_LEFT_OUT, WHERE_LEFT_OUT};
 use crate::show::Observer;
 
 /// What impedance surfaces leave out of losses in words, of each conductor where that is the largest share.
-pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<String> {
+pub(super) fn of_conductors(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<String> {
     let mut worst: BTreeMap<String, (ExcessLoss, &FieldModel)> = BTreeMap::new();
     for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
         for found in excess_losses(model, &analysis.mesh, solution) {
@@ -49,9 +49,15 @@ pub(super) fn of_conductors(problem: &Problem, analysis: &Analysis) -> Vec<Strin
         // The one that has most of that sign.
         reasons.sort_by(|a, b| (found.more() * b.0).total_cmp(&(found.more() * a.0)));
         let [(_, why, cure), ..] = reasons;
+        let is_pushed = config.forces.iter().any(|body| body.regions.contains(&found.region));
+        let force = if is_pushed {
+            "; force and torque on it are off by some of that, up to two fifths of as many percent where that was looked at"
+        } else {
+            ""
+        };
         format!(
             "`{}` has about {:.1} % {more} loss at {} Hz{} than its impedance surface, mostly {why}, \
-             and no error bar counts that. Where its loss matters, or the field in a bore or slit \
+             and no error bar counts that{force}. Where its loss matters, or the field in a bore or slit \
              of a few skin depths, mesh it (model = \"volume\"){cure}",
             found.region,
             100.0 * found.share().abs(),

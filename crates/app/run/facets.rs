@@ -220,9 +220,10 @@ fn described(found: &CurvedFacets, objectives: &[f64], most: Option<&(String, f6
     let of_largest = found.change.into_iter().flatten().map(|change| change.abs() / largest);
     let matters = of_largest.chain(most.map(|own| own.1.abs())).any(|share| share >= MATTERS);
     format!(
-        "{head}: on it in the mean they change {}, which no error bar counts and no refinement takes away{}",
+        "{head}: the facets of all curved surfaces, on these in the mean, change {}, which no error bar counts and no refinement takes \
+         away{}",
         changed.join(", and "),
-        if matters { "; begin with smaller faces there" } else { "" }
+        if matters { "; begin with smaller faces on them, first near what is observed" } else { "" }
     )
 }
 

@@ -61,7 +61,7 @@ pub(super) fn reservations(
     let problem = &setup.problem;
     let mut all = saturation(config, problem, analysis);
     all.extend(skin_warnings(&skins_of_curves(config, setup, analysis)));
-    all.extend(excess::of_conductors(problem, analysis));
+    all.extend(excess::of_conductors(config, problem, analysis));
     all.extend(transmission::warnings(config, problem, analysis));
     let least = problem
         .shape()

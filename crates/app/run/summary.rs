@@ -7,7 +7,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::body::Body;
-use fluxmorph_optimizer::constraint::{Bound, Constraint};
+use fluxmorph_optimizer::constraint::{Bound, Constraint, Limit, Quantity};
 use fluxmorph_optimizer::driver::Best;
 use fluxmorph_optimizer::objective::{Combination, Term};
 use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Measured, Problem, Shape, Timings};
@@ -359,14 +359,22 @@ pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) 
     })
 }
 
-/// The constraints at a design.
+/// The constraints at a design; thicknesses without the margin that a search keeps.
 pub(super) fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Bound]) -> Vec<ConstraintResult> {
-    let of = |((constraint, measured), bound): ((&Constraint, &Measured), &Bound)| ConstraintResult {
-        name: constraint.name.clone(),
-        value: measured.value,
-        bound: bound.value,
-        satisfied: bound.is_satisfied(measured.value),
-        error_estimate: None,
+    let thickness = problem.shape().and_then(|shape| Some(shape.thickness()?.range(&analysis.mesh)));
+    let of = |((constraint, measured), bound): ((&Constraint, &Measured), &Bound)| {
+        let value = match (&constraint.quantity, constraint.limit, thickness) {
+            (Quantity::Thickness { .. }, Limit::AtLeast(_), Some((least, _))) => least,
+            (Quantity::Thickness { .. }, _, Some((_, most))) => most,
+            _ => measured.value,
+        };
+        ConstraintResult {
+            name: constraint.name.clone(),
+            value,
+            bound: bound.value,
+            satisfied: bound.is_satisfied(value),
+            error_estimate: None,
+        }
     };
     problem.constraints().iter().zip(&analysis.constraints).zip(bounds).map(of).collect()
 }
@@ -418,7 +426,6 @@ pub(super) fn linear_solver(
 mod tests {
     use std::path::Path;
 
-    use fluxmorph_optimizer::constraint::{Limit, Quantity};
     use fluxmorph_optimizer::problem::{Derivatives, NoProgress, SolverCache};
 
     use super::*;

@@ -90,6 +90,11 @@ impl Constraint {
         }
     }
 
+    /// Whether a search keeps more than its bound asks for: a hundredth of a thickness.
+    pub fn has_margin(&self) -> bool {
+        self.thickness().is_some()
+    }
+
     /// The number of its [limits](Self::limits).
     pub fn limit_count(&self) -> Option<usize> {
         self.thickness()?.limit_count()

@@ -189,7 +189,7 @@ impl Run<'_> {
                 Ok(Some(reason))
             }
             Err(Stop::Error(error)) => Err(*error),
-            Err(Stop::Mesh(_) | Stop::CutShort) => Ok(Some(reason)),
+            Err(Stop::Mesh(_) | Stop::CutShort | Stop::Astray) => Ok(Some(reason)),
         }
     }
 

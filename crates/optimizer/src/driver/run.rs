@@ -16,6 +16,9 @@ use crate::problem::{Problem, Shape, SolverCache, Timings};
 /// Share of the initial objective below which what is left is taken for rounding: a millionth of a field, squared.
 const VANISHED: f64 = 1e-12;
 
+/// Share of what a search has gained above which the gradient promises much beside it.
+const MUCH: f64 = 0.5;
+
 /// The state of one optimisation.
 pub(super) struct Run<'a> {
     pub(super) problem: &'a mut Problem,
@@ -322,6 +325,12 @@ impl<'a> Run<'a> {
         self.least_promised().filter(|least| *least > BELIEVED_TOLERANCES * self.settings.least_gain())
     }
 
+    /// What the gradient promises at the best design at least, where that is more than the tolerance and much beside what was gained.
+    fn promised_beside(&self, gain: f64) -> Option<f64> {
+        self.promised(1.0)?;
+        self.least_promised().filter(|least| *least > (MUCH * gain).max(self.settings.least_gain()))
+    }
+
     /// Whether bounds and constraints together leave nothing of what the gradient promises at the best design.
     pub(super) fn is_held(&self) -> bool {
         self.least_promised().is_some_and(|least| least < HELD_TOLERANCES * self.settings.least_gain())
@@ -400,16 +409,19 @@ impl<'a> Run<'a> {
         let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
         let names: Vec<String> = violated
             .map(|((excess, _), (own, bound))| {
-                format!("`{}` by {excess:.1e} {}", own.name, bound.excess_is())
+                let margin =
+                    if own.has_margin() { ", of which it keeps a hundredth as a margin" } else { "" };
+                format!("`{}` by {excess:.1e} {}{margin}", own.name, bound.excess_is())
             })
             .collect();
         let mut warnings = Vec::new();
-        let promised = self.surely_promised();
+        let gain = (best.objective / initial.objective - 1.0).abs();
+        let promised = self.surely_promised().or_else(|| self.promised_beside(gain));
         if let Some(promised) = promised.filter(|_| stop_reason == StopReason::ObjectiveConverged) {
             warnings.push(format!(
-                "the search came to its tolerance while the gradient still promises {:.0} % of the objective, if all designs within \
-                 the bounds had its slope: a run by another method, or one that begins with this design, shows how much of that is \
-                 to be had",
+                "the search came to its tolerance while the gradient still promises {:.1} % of the objective, if all designs within \
+                 the bounds had its slope: a run by another method or with a smaller tolerance, or one that begins with this design, \
+                 shows how much of that is to be had",
                 100.0 * promised
             ));
         }

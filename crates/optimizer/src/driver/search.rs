@@ -13,6 +13,10 @@ use crate::nlopt::{Ending, Minimisation, Outcome, Sample, minimise};
 /// How much of the trust region is left after a design in it was refused and nothing was gained.
 const SHRINK: f64 = 0.5;
 
+/// Evaluations in a row that may leave constraints as far from being kept as they were, where no design keeps all: a step by `slsqp` takes
+/// up to ten, and where bounds are out of reach it never ends.
+const MOST_ASTRAY: usize = 15;
+
 /// How often the trust region may shrink without a gain: to an eighth.
 const MAX_SHRINKS: usize = 3;
 
@@ -109,8 +113,14 @@ impl<'a> Search<'a> {
             first_step: self.settings.first_step,
         };
         let before = (run.evaluations(), run.incumbent_values());
+        let (may_stray, mut mended) = (self.is_restoring, before);
         let outcome = minimise(&minimisation, &run.centre(), |p| {
             let mut sample = run.evaluate(p)?;
+            if run.has_gained(mended, 0.0) {
+                mended = (run.evaluations(), run.incumbent_values());
+            } else if !may_stray && run.violates() && run.evaluations() - mended.0 >= MOST_ASTRAY {
+                return Err(Stop::Astray);
+            }
             sample.limits.iter_mut().zip(&leeway).for_each(|((c, _), leeway)| *c -= leeway);
             match sample.with_limits(&replaced, run.constraint_count()) {
                 _ if restores && !run.violates() => Err(Stop::CutShort),
@@ -144,6 +154,7 @@ impl<'a> Search<'a> {
             }
             Outcome::Failed(cause) => Err(Error::Optimisation { cause }),
             Outcome::Interrupted(Stop::CutShort) => Ok(NextStep::SearchOn),
+            Outcome::Interrupted(Stop::Astray) => Ok(NextStep::Restore),
             Outcome::Interrupted(Stop::Limit(reason)) => Ok(NextStep::Stop(reason)),
             Outcome::Interrupted(Stop::Error(error)) if run.has_best() && error.is_numerical() => {
                 run.warn(&error.to_string());

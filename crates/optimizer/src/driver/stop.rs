@@ -11,6 +11,8 @@ pub(super) enum Stop {
     Mesh(Refusal),
     /// The mesh carries a part of the step to a design, which is the best one now.
     CutShort,
+    /// Constraints are not kept, and many designs have not come nearer to that.
+    Astray,
     Error(Box<Error>),
 }
 
