@@ -20,8 +20,11 @@ use crate::config::{self, Config, Diagnostic, MeshConfig, SourceMap};
 /// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
 const USUAL: [f64; 2] = [1e-3, 30.0];
 
-/// Share of the size of a mesh by which a node may be off a plane, and difference of the cosines of planes that are one.
+/// Share of the size of a mesh by which a node may be off a plane.
 const PLANE: f64 = 1e-9;
+
+/// Differences of unit normals, and of distances as shares of that size, of planes that are taken for one.
+const SAME: f64 = 1e-7;
 
 /// Share of a mesh that is air in devices with air around them.
 const MOSTLY: f64 = 0.75;
@@ -232,46 +235,34 @@ pub(crate) fn overlap_warning(
     ))
 }
 
-/// Where walls have gone farthest beyond a flat side that they begin at: one that has all of the mesh before it and none of these walls
-/// in it, and stays where it is.
+/// Where walls have gone beyond a flat side: one that has all of the mesh before it and none of these walls in it, and stays where it is.
 fn beyond_a_side([original, moved]: [&Mesh; 2], walls: &[[NodeId; 3]]) -> Option<Point> {
-    let rounding = PLANE * size(original);
+    let (size, topology) = (size(original), original.topology());
+    let rounding = PLANE * size;
     let of_walls: BTreeSet<NodeId> = walls.iter().flatten().copied().collect();
     let keys: HashSet<[NodeId; 3]> = walls.iter().copied().map(face_key).collect();
-    let beside = original.topology().facets().iter().filter(|facet| {
-        facet.outside.is_none()
-            && !keys.contains(&face_key(facet.nodes))
-            && facet.nodes.iter().any(|n| of_walls.contains(n))
-    });
-    let mut sides: Vec<(Point, f64)> = Vec::new();
-    for facet in beside {
-        let outwards = normal(original, facet.nodes);
-        let side = (outwards, dot(outwards, original.point(facet.nodes[0])));
-        let is_same =
-            |(n, at): &(Point, f64)| dot(*n, outwards) > 1.0 - PLANE && (at - side.1).abs() < rounding;
-        if !sides.iter().any(is_same) {
-            sides.push(side);
-        }
-    }
-    let mut farthest: Option<(f64, Point)> = None;
-    for (outwards, at) in sides {
+    let others = topology.facets().iter().filter(|facet| facet.outside.is_none());
+    let others = others.map(|facet| facet.nodes).filter(|face| !keys.contains(&face_key(*face)));
+    let mut seen = HashSet::new();
+    let mut found = others.filter_map(|face| {
+        let outwards = normal(original, face);
+        let at = dot(outwards, original.point(face[0]));
+        let [x, y, z] = outwards;
+        // A plane once, or a few times.
+        seen.insert([x, y, z, at / size].map(|c| (c / SAME).round() as i64)).then_some(())?;
         let height = |mesh: &Mesh, n: NodeId| dot(outwards, mesh.point(n)) - at;
+        let highest = |a: &NodeId, b: &NodeId| height(moved, *a).total_cmp(&height(moved, *b));
+        let farthest = *of_walls.iter().max_by(|a, b| highest(a, b))?;
+        if height(moved, farthest) <= rounding {
+            return None;
+        }
         let is_in_it = |n: NodeId| height(original, n).abs() <= rounding;
-        let is_side = original.topology().nodes().all(|n| {
-            height(original, n) <= rounding
-                && (of_walls.contains(&n) || !is_in_it(n) || height(moved, n).abs() <= rounding)
-        });
-        if !is_side || walls.iter().any(|wall| wall.iter().all(|n| is_in_it(*n))) {
-            continue;
-        }
-        for &n in &of_walls {
-            let beyond = height(moved, n);
-            if beyond > farthest.map_or(rounding, |(most, _)| most) {
-                farthest = Some((beyond, moved.point(n)));
-            }
-        }
-    }
-    farthest.map(|(_, place)| place)
+        let stays = |n: NodeId| of_walls.contains(&n) || !is_in_it(n) || height(moved, n).abs() <= rounding;
+        let is_side = topology.nodes().all(|n| height(original, n) <= rounding && stays(n));
+        let has_walls = || walls.iter().any(|wall| wall.iter().all(|n| is_in_it(*n)));
+        (is_side && !has_walls()).then(|| moved.point(farthest))
+    });
+    found.next()
 }
 
 fn contact_fault(source: &SourceMap, mesh: &Mesh, contact: &Contact) -> Diagnostic {
