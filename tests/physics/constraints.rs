@@ -213,7 +213,8 @@ fn where_bounds_cannot_be_kept_the_worst_of_them_is_made_as_small_as_it_can_be()
     let limits = "[[constraints]]\nkind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n\
                   upper = 1e-4\n[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper_ratio = 0.9\n\
                   [[constraints]]\nkind = \"volume\"\nregion = \"plate\"\nupper_ratio = 1.1\n[design]";
-    for algorithm in [Algorithm::Mma, Algorithm::Ccsaq] {
+    // The last one creeps after the objective until it is turned to the violation, and ends a little before the others.
+    for (algorithm, off) in [(Algorithm::Mma, 1e-3), (Algorithm::Ccsaq, 1e-3), (Algorithm::Slsqp, 3e-2)] {
         let (run, _) = with("shield_quick.toml", &[("[design]", limits)], |s| Optimizer {
             algorithm,
             max_evaluations: 60,
@@ -221,8 +222,8 @@ fn where_bounds_cannot_be_kept_the_worst_of_them_is_made_as_small_as_it_can_be()
         });
         println!("{algorithm:?}: {:.6e} for {best:.6e}, {} evaluations", measured(&run, 0), run.evaluations);
         assert_eq!(run.stop_reason, StopReason::Infeasible);
-        // Both searches end within the same tolerance of the objective.
-        assert!((measured(&run, 0) / best - 1.0).abs() < 1e-3, "{algorithm:?}: {}", measured(&run, 0) / best);
+        // Two searches end within the same tolerance of the objective.
+        assert!((measured(&run, 0) / best - 1.0).abs() < off, "{algorithm:?}: {}", measured(&run, 0) / best);
     }
 }
 

@@ -422,7 +422,7 @@ fn a_conductor_that_has_more_loss_than_its_surface_is_named() {
     let copper = said("copper", &[&of_copper[..], &[forces]].concat());
     for words in [
         "% more loss at 60 Hz than its impedance surface, mostly at its sharp edges",
-        "force and torque on it",
+        "force and torque on it are off too",
     ] {
         assert!(copper.contains(words), "{words}: {copper}");
     }

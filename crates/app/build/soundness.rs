@@ -20,11 +20,15 @@ use crate::config::{self, Config, Diagnostic, MeshConfig, SourceMap};
 /// Sizes of a mesh file beyond which its unit is doubted [m]: a speck, and a house.
 const USUAL: [f64; 2] = [1e-3, 30.0];
 
-/// Share of the size of a mesh by which a node may be off a plane.
+/// Share of the size of a mesh by which a node may be off a plane: rounding of coordinates and of the motion.
 const PLANE: f64 = 1e-9;
 
-/// Differences of unit normals, and of distances as shares of that size, of planes that are taken for one.
+/// Differences of unit normals, and of distances as shares of that size, of planes that are looked at once: those of small facets have
+/// more rounding.
 const SAME: f64 = 1e-7;
+
+/// Cosine of the angle (45 degrees) between normals of neighbouring outer faces below which an edge is between them.
+const ROUND: f64 = std::f64::consts::FRAC_1_SQRT_2 + 1e-6;
 
 /// Share of a mesh that is air in devices with air around them.
 const MOSTLY: f64 = 0.75;
@@ -214,14 +218,13 @@ pub(crate) fn overlap_warning(
     if walls.is_empty() {
         return None;
     }
-    let hull = Hull::new(moved);
-    let found = contacts(&hull, &vec![false; hull.faces().len()]);
-    let overlap = found.iter().find(|contact| contact.meeting == Meeting::Overlapping);
+    // What overlaps from the beginning is not the design's.
+    let overlap = overlap(moved).filter(|_| overlap(original).is_none());
     let what = match overlap {
-        Some(overlap) => format!(
+        Some(place) => format!(
             "the design surface has passed through another wall at {}, and the mesh overlaps itself: nothing is left there of the body \
              between them, and no number of this design means anything",
-            millimetres(overlap.place)
+            millimetres(place)
         ),
         None => format!(
             "the design surface has passed beyond a flat side of the mesh at {}: where that is a plane of symmetry, the mesh overlaps its \
@@ -235,32 +238,39 @@ pub(crate) fn overlap_warning(
     ))
 }
 
-/// Where walls have gone beyond a flat side: one that has all of the mesh before it and none of these walls in it, and stays where it is.
+/// A place at which a mesh overlaps itself.
+fn overlap(mesh: &Mesh) -> Option<Point> {
+    let hull = Hull::new(mesh);
+    let found = contacts(&hull, &vec![false; hull.faces().len()]);
+    found.iter().find(|contact| contact.meeting == Meeting::Overlapping).map(|contact| contact.place)
+}
+
+/// Where walls have gone beyond a flat side: one that has all of the mesh before it and none of these walls in it, stays where it is, and
+/// ends at edges: facets of a round outside are none.
 fn beyond_a_side([original, moved]: [&Mesh; 2], walls: &[[NodeId; 3]]) -> Option<Point> {
     let (size, topology) = (size(original), original.topology());
     let rounding = PLANE * size;
     let of_walls: BTreeSet<NodeId> = walls.iter().flatten().copied().collect();
     let keys: HashSet<[NodeId; 3]> = walls.iter().copied().map(face_key).collect();
-    let others = topology.facets().iter().filter(|facet| facet.outside.is_none());
-    let others = others.map(|facet| facet.nodes).filter(|face| !keys.contains(&face_key(*face)));
+    let outer = || topology.facets().iter().filter(|facet| facet.outside.is_none()).map(|facet| facet.nodes);
     let mut seen = HashSet::new();
-    let mut found = others.filter_map(|face| {
+    let mut found = outer().filter(|face| !keys.contains(&face_key(*face))).filter_map(|face| {
         let outwards = normal(original, face);
         let at = dot(outwards, original.point(face[0]));
         let [x, y, z] = outwards;
-        // A plane once, or a few times.
         seen.insert([x, y, z, at / size].map(|c| (c / SAME).round() as i64)).then_some(())?;
         let height = |mesh: &Mesh, n: NodeId| dot(outwards, mesh.point(n)) - at;
-        let highest = |a: &NodeId, b: &NodeId| height(moved, *a).total_cmp(&height(moved, *b));
-        let farthest = *of_walls.iter().max_by(|a, b| highest(a, b))?;
-        if height(moved, farthest) <= rounding {
-            return None;
-        }
+        let beyond = |n: &NodeId| height(moved, *n) > rounding && height(original, *n) < -rounding;
+        let passed = *of_walls.iter().find(|n| beyond(n))?;
         let is_in_it = |n: NodeId| height(original, n).abs() <= rounding;
         let stays = |n: NodeId| of_walls.contains(&n) || !is_in_it(n) || height(moved, n).abs() <= rounding;
         let is_side = topology.nodes().all(|n| height(original, n) <= rounding && stays(n));
-        let has_walls = || walls.iter().any(|wall| wall.iter().all(|n| is_in_it(*n)));
-        (is_side && !has_walls()).then(|| moved.point(farthest))
+        let lies_in_it = |face: &[NodeId; 3]| face.iter().all(|n| is_in_it(*n));
+        let goes_on = |face: [NodeId; 3]| {
+            let shares_an_edge = face.iter().filter(|n| is_in_it(**n)).count() == 2;
+            shares_an_edge && dot(normal(original, face), outwards) > ROUND
+        };
+        (is_side && !walls.iter().any(lies_in_it) && !outer().any(goes_on)).then(|| moved.point(passed))
     });
     found.next()
 }
@@ -352,6 +362,8 @@ fn patch_fault(source: &SourceMap, patch: &OpenPatch, text: String) -> Diagnosti
 
 #[cfg(test)]
 mod tests {
+    use fluxmorph_geometry::generate::{SphereParameters, sphere};
+
     use super::*;
     use crate::build::build_mesh;
 
@@ -395,9 +407,28 @@ mod tests {
                 Some("has passed beyond a flat side of the mesh at (0.000, 0.000, -2.000) mm"),
             ),
         ] {
-            let said = said(plate, face, motion);
+            let found = said(plate, face, motion);
             let is_expected = |text: &str| expected.is_some_and(|own| text.contains(own));
-            assert!(said.as_deref().map_or(expected.is_none(), is_expected), "{face} {motion}: {said:?}");
+            assert!(found.as_deref().map_or(expected.is_none(), is_expected), "{face} {motion}: {found:?}");
         }
+    }
+
+    /// A cap of the outside of an octant of a ball that bulges: it is beyond the planes of the facets around it, and of no side.
+    #[test]
+    fn facets_of_a_round_outside_are_no_sides() {
+        let parameters = SphereParameters { divisions: 4, ..SphereParameters::default() };
+        let mesh = sphere(&parameters).expect("defaults are valid");
+        let is_of_cap = |n: &NodeId| {
+            let x = mesh.point(*n);
+            norm(x) > 0.999 * parameters.outer_radius && x[2] > 0.6 * parameters.outer_radius
+        };
+        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+        let walls: Vec<[NodeId; 3]> =
+            outer.map(|facet| facet.nodes).filter(|face| face.iter().all(is_of_cap)).collect();
+        let bulged = |n: NodeId| mesh.point(n).map(|c| if is_of_cap(&n) { 1.1 * c } else { c });
+        let points = mesh.topology().nodes().map(bulged).collect();
+        let moved = Mesh::new(mesh.topology().clone(), points).expect("sound");
+        assert!(walls.len() > 4);
+        assert_eq!(beyond_a_side([&mesh, &moved], &walls), None);
     }
 }

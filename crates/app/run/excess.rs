@@ -51,7 +51,7 @@ pub(super) fn of_conductors(config: &Config, problem: &Problem, analysis: &Analy
         let [(_, why, cure), ..] = reasons;
         let is_pushed = config.forces.iter().any(|body| body.regions.contains(&found.region));
         let force = if is_pushed {
-            "; force and torque on it are off by some of that, up to two fifths of as many percent where that was looked at"
+            "; force and torque on it are off too, by up to 0.4 times that percentage on the bodies that were looked at"
         } else {
             ""
         };

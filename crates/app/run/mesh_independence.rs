@@ -39,7 +39,7 @@ const MOST_EVALUATIONS: f64 = 25.0;
 /// the nodes of coarse cells a smooth shape is off by some percent.
 const LARGEST_DEVIATION: f64 = 0.1;
 
-/// Why they may be so far off.
+/// Why facets may be far from what a control grid describes.
 const WHY_FAR: &str = "as the control grid is finer than the cells of the surface, or bends within them";
 
 /// Share of the gain by which both ratios may be apart all the same.
@@ -300,7 +300,7 @@ impl MeshIndependence<'_> {
 fn of_another_shape(found: &Verification, ratio: f64) -> Option<String> {
     let deviation = found.deviation?;
     if found.mesh == VerificationMesh::Cut {
-        return of_facets(deviation).map(|facets| format!("{facets}; cut elements keep them"));
+        return of_facets(deviation).map(|facets| format!("{facets}; cut elements keep the facets"));
     }
     let differs = (found.ratio - ratio).abs() > LARGEST_DIFFERENCE * (ratio - 1.0).abs();
     (differs && is_far(deviation)).then(|| {
@@ -330,7 +330,7 @@ fn is_far(ShapeDeviation { distance_m, motion_m }: ShapeDeviation) -> bool {
 
 fn distance(ShapeDeviation { distance_m, motion_m }: ShapeDeviation) -> String {
     let [distance, motion] = [distance_m, motion_m].map(Millimetres);
-    format!("up to {distance:.3} mm, of {motion:.3} mm of motion, from")
+    format!("up to {distance:.3} mm (of {motion:.3} mm of motion) away from")
 }
 
 /// The configuration without what belongs to its own mesh.

@@ -7,7 +7,7 @@ use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_optimizer::body::Body;
-use fluxmorph_optimizer::constraint::{Bound, Constraint, Limit, Quantity};
+use fluxmorph_optimizer::constraint::{Bound, Constraint, Quantity};
 use fluxmorph_optimizer::driver::Best;
 use fluxmorph_optimizer::objective::{Combination, Term};
 use fluxmorph_optimizer::problem::{Analysis, ErrorEstimate, Measured, Problem, Shape, Timings};
@@ -361,11 +361,10 @@ pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) 
 
 /// The constraints at a design; thicknesses without the margin that a search keeps.
 pub(super) fn constraints(problem: &Problem, analysis: &Analysis, bounds: &[Bound]) -> Vec<ConstraintResult> {
-    let thickness = problem.shape().and_then(|shape| Some(shape.thickness()?.range(&analysis.mesh)));
+    let thickness = problem.shape().and_then(|shape| shape.thickness());
     let of = |((constraint, measured), bound): ((&Constraint, &Measured), &Bound)| {
-        let value = match (&constraint.quantity, constraint.limit, thickness) {
-            (Quantity::Thickness { .. }, Limit::AtLeast(_), Some((least, _))) => least,
-            (Quantity::Thickness { .. }, _, Some((_, most))) => most,
+        let value = match (&constraint.quantity, thickness) {
+            (Quantity::Thickness { measure, .. }, Some(own)) => measure.extreme(own, &analysis.mesh),
             _ => measured.value,
         };
         ConstraintResult {
@@ -426,6 +425,7 @@ pub(super) fn linear_solver(
 mod tests {
     use std::path::Path;
 
+    use fluxmorph_optimizer::constraint::Limit;
     use fluxmorph_optimizer::problem::{Derivatives, NoProgress, SolverCache};
 
     use super::*;

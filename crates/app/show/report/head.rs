@@ -89,7 +89,9 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
     }
     cards.extend(objective.map(|objective| finer_mesh_card(data, objective)));
     let accuracy = data.result.as_ref().and_then(|result| result.accuracy.as_ref());
-    cards.extend(objective.zip(accuracy).and_then(|(objective, accuracy)| gain_card(objective, accuracy)));
+    cards.extend(
+        objective.zip(accuracy).and_then(|(objective, accuracy)| gain_card(data, objective, accuracy)),
+    );
     let (evaluations, iterations) = match (&data.result, data.history.last()) {
         (Some(result), _) => (result.evaluations, result.iterations),
         (None, Some(row)) => (row.evaluation.saturating_add(1), row.iteration),
@@ -101,7 +103,7 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
 }
 
 /// Whether the gain is the shape's, with the error bar; `None` where nothing says so.
-fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
+fn gain_card(data: &RunData, objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
     let verdict = match (accuracy.verdict?, accuracy.reservation(objective)) {
         (Verdict::NotConfirmed, _) => "NOT CONFIRMED",
         (Verdict::Confirmed, None) => "confirmed",
@@ -113,8 +115,8 @@ fn gain_card(objective: &ObjectiveResult, accuracy: &Accuracy) -> Option<Card> {
             Some(format!("F / F₀ = {} ± {}", ticks::ratio(objective.ratio), bar(error * objective.ratio)))
         }
         (None, errors) => errors.map(|[first, last]| {
-            format!("F₀ = {} ± {}", number(objective.initial, 4), bar(first))
-                + &format!(", F = {} ± {}", number(objective.best, 4), bar(last))
+            let [initial, best] = [objective.initial, objective.best].map(|value| number(value, 4));
+            format!("F₀ = {initial} ± {}, F = {best} ± {} {}", bar(first), bar(last), unit(data))
         }),
     };
     let other = accuracy.cross_check.as_ref().map(|check| {

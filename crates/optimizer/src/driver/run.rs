@@ -16,7 +16,7 @@ use crate::problem::{Problem, Shape, SolverCache, Timings};
 /// Share of the initial objective below which what is left is taken for rounding: a millionth of a field, squared.
 const VANISHED: f64 = 1e-12;
 
-/// Share of what a search has gained above which the gradient promises much beside it.
+/// Share of what a search has gained above which what the gradient promises to first order is said: as much again may be there.
 const MUCH: f64 = 0.5;
 
 /// The state of one optimisation.
@@ -325,10 +325,11 @@ impl<'a> Run<'a> {
         self.least_promised().filter(|least| *least > BELIEVED_TOLERANCES * self.settings.least_gain())
     }
 
-    /// What the gradient promises at the best design at least, where that is more than the tolerance and much beside what was gained.
+    /// What the gradient promises at the best design at least, where something was gained, and the tolerance and much of that gain is less.
     fn promised_beside(&self, gain: f64) -> Option<f64> {
-        self.promised(1.0)?;
-        self.least_promised().filter(|least| *least > (MUCH * gain).max(self.settings.least_gain()))
+        let tolerance = self.settings.least_gain();
+        self.promised(1.0).filter(|_| gain > tolerance)?;
+        self.least_promised().filter(|least| *least > (MUCH * gain).max(tolerance))
     }
 
     /// Whether bounds and constraints together leave nothing of what the gradient promises at the best design.
@@ -410,7 +411,7 @@ impl<'a> Run<'a> {
         let names: Vec<String> = violated
             .map(|((excess, _), (own, bound))| {
                 let margin =
-                    if own.has_margin() { ", of which it keeps a hundredth as a margin" } else { "" };
+                    if own.has_margin() { " (the search keeps a hundredth of it as a margin)" } else { "" };
                 format!("`{}` by {excess:.1e} {}{margin}", own.name, bound.excess_is())
             })
             .collect();

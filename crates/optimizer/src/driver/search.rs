@@ -13,9 +13,12 @@ use crate::nlopt::{Ending, Minimisation, Outcome, Sample, minimise};
 /// How much of the trust region is left after a design in it was refused and nothing was gained.
 const SHRINK: f64 = 0.5;
 
-/// Evaluations in a row that may leave constraints as far from being kept as they were, where no design keeps all: a step by `slsqp` takes
-/// up to ten, and where bounds are out of reach it never ends.
+/// Evaluations in a row that may bring constraints hardly nearer to being kept, where no design keeps all: a step by `slsqp` takes up to
+/// ten, and where bounds are out of reach it goes on for the objective without end.
 const MOST_ASTRAY: usize = 15;
+
+/// Share of the violation that so many must take away.
+const MENDED: f64 = 0.1;
 
 /// How often the trust region may shrink without a gain: to an eighth.
 const MAX_SHRINKS: usize = 3;
@@ -116,7 +119,7 @@ impl<'a> Search<'a> {
         let (may_stray, mut mended) = (self.is_restoring, before);
         let outcome = minimise(&minimisation, &run.centre(), |p| {
             let mut sample = run.evaluate(p)?;
-            if run.has_gained(mended, 0.0) {
+            if run.has_gained(mended, MENDED) {
                 mended = (run.evaluations(), run.incumbent_values());
             } else if !may_stray && run.violates() && run.evaluations() - mended.0 >= MOST_ASTRAY {
                 return Err(Stop::Astray);

@@ -30,7 +30,7 @@ fn why(at: Option<Point>) -> String {
         |at| {
             let at = millimetres(at);
             format!(
-                "against its direction the node of the design surface at {at} has no face of a body opposite"
+                "a ray from the design node at {at} against its direction meets no opposite face of a body"
             )
         },
     )

@@ -15,6 +15,7 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::tet4::{dot, norm};
 use fluxmorph_remesh::{Moved, RemeshError};
 
@@ -164,6 +165,16 @@ impl ThicknessBound {
             }
         }
         Some(limits)
+    }
+
+    /// The least thickness [m] on a moved mesh, of a maximum the greatest, without the margin that is kept.
+    pub fn extreme(&self, thickness: &WallThickness, mesh: &Mesh) -> f64 {
+        let walls = thickness.walls(|n| mesh.point(n)).filter(|(_, wall)| counts(self.bound, wall));
+        let walls = walls.map(|(_, wall)| wall.thickness);
+        match self.bound {
+            ThicknessLimit::Minimum(_) => walls.fold(f64::INFINITY, f64::min),
+            ThicknessLimit::Maximum(_) => walls.fold(f64::NEG_INFINITY, f64::max),
+        }
     }
 
     /// How far the limit is exceeded on a moved mesh [m], at most 0 where it is satisfied, and the derivative with respect to

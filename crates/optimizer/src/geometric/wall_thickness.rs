@@ -43,16 +43,16 @@ const MOST_TURNS: usize = 5;
 enum Corner {
     /// A node of the mesh.
     Node(NodeId),
-    /// A place that stays [m]: of a node of the mesh that was measured which the one that is solved on does not have, within the faces
-    /// in which a plane of symmetry cuts a region that its surface replaces.
-    Still(Point),
+    /// A fixed place [m]: of a node of the full mesh that the solved one lacks. Such nodes lie inside the cut that a plane of symmetry
+    /// makes through a region which its surface replaces, and no distance to that plane changes with their motion in it.
+    Fixed(Point),
 }
 
 impl Corner {
     fn node(self) -> Option<NodeId> {
         match self {
             Self::Node(node) => Some(node),
-            Self::Still(_) => None,
+            Self::Fixed(_) => None,
         }
     }
 }
@@ -163,9 +163,9 @@ impl WallThickness {
     pub fn renumbered(&self, measured: &Mesh, new_of: &[Option<NodeId>]) -> Self {
         let renumber = |corner: Corner| match corner {
             Corner::Node(n) => {
-                new_of[n.index()].map_or_else(|| Corner::Still(measured.point(n)), Corner::Node)
+                new_of[n.index()].map_or_else(|| Corner::Fixed(measured.point(n)), Corner::Node)
             }
-            still @ Corner::Still(_) => still,
+            fixed @ Corner::Fixed(_) => fixed,
         };
         let of = |(place, own): &(usize, Opposite)| {
             (*place, Opposite { corners: own.corners.map(renumber), ..*own })
@@ -247,7 +247,7 @@ fn wall(opposite: &Opposite, place: &impl Fn(NodeId) -> Point) -> Wall {
     let terms = [(node, 1.0), (a, -weights[0]), (b, -weights[1]), (c, -weights[2])];
     let at = |corner: Corner| match corner {
         Corner::Node(n) => place(n),
-        Corner::Still(point) => point,
+        Corner::Fixed(point) => point,
     };
     Wall {
         thickness: terms.iter().map(|&(corner, weight)| weight * dot(growth, at(corner))).sum(),

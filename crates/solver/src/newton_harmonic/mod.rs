@@ -32,7 +32,7 @@ use crate::tangents::Tangents;
 
 mod search;
 
-use search::Measure;
+use search::Monotonicity;
 
 /// Elements whose integrals are held at once: some megabytes.
 const CHUNK: usize = 8192;
@@ -400,11 +400,13 @@ pub(crate) fn solve(
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
     let problem = Problem::new(model, mesh);
-    let measure = Measure::of(problem.circuits.as_ref());
-    match descend(&problem, measure, (systems, start), observer) {
-        // What steps ask for may lead astray as well: from the same start again.
-        Err(SolverError::Newton { failure: NewtonFailure::Law, .. }) if measure == Measure::Asked => {
-            descend(&problem, Measure::Residual, (systems, start), observer)
+    let monotonicity = Monotonicity::of(problem.circuits.as_ref());
+    match descend(&problem, monotonicity, (systems, start), observer) {
+        // From the same values again, with the method that was come to.
+        Err(SolverError::Newton { failure: NewtonFailure::Law, .. })
+            if monotonicity == Monotonicity::Natural =>
+        {
+            descend(&problem, Monotonicity::Residual, (systems, start), observer)
         }
         ended => ended,
     }
@@ -413,7 +415,7 @@ pub(crate) fn solve(
 /// Newton's method with steps of which this becomes shorter.
 fn descend(
     problem: &Problem<'_>,
-    measure: Measure,
+    monotonicity: Monotonicity,
     (systems, start): (&mut StepSystems<'_>, Option<&[c64]>),
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
@@ -454,7 +456,7 @@ fn descend(
             tangent.invert(Side::State, &right_side, &mut system, tolerance)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
         let found = if goes_on {
-            problem.search_from(&iterate, &step, measure, (&tangent, &mut system))?
+            problem.search_from(&iterate, &step, monotonicity, (&tangent, &mut system))?
         } else {
             None
         };

@@ -20,18 +20,18 @@ const NATURAL: f64 = 0.25;
 
 /// What has to become shorter along a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Measure {
-    /// What the derivative at the start makes of the residual (the natural monotonicity of P. Deuflhard, Newton Methods for Nonlinear
-    /// Problems, chapter 3), or, as it may at turning points, does not, and the residual decides.
-    Asked,
+pub(super) enum Monotonicity {
+    /// The step that the residual asks for by the derivative at the start (P. Deuflhard, Newton Methods for Nonlinear Problems,
+    /// chapter 3).
+    Natural,
     /// The residual.
     Residual,
 }
 
-impl Measure {
+impl Monotonicity {
     /// The first choice: where a capacitance is in series the residual is no error of a field.
     pub(super) fn of(circuits: Option<&Equations>) -> Self {
-        if circuits.is_some_and(Equations::have_capacitance) { Self::Asked } else { Self::Residual }
+        if circuits.is_some_and(Equations::have_capacitance) { Self::Natural } else { Self::Residual }
     }
 }
 
@@ -70,15 +70,15 @@ impl Problem<'_> {
         Ok(None)
     }
 
-    /// A length of Newton's own step.
+    /// A length of Newton's own step. Where none passes the natural test, as at turning points, the residual decides.
     pub(super) fn search_from(
         &self,
         from: &Iterate,
         step: &[c64],
-        measure: Measure,
+        monotonicity: Monotonicity,
         (tangent, nearest): (&HarmonicTangent, &mut PreparedSystem),
     ) -> Result<Option<(Iterate, f64)>, SolverError> {
-        if measure == Measure::Residual {
+        if monotonicity == Monotonicity::Residual {
             return self.search(from, step, nearest);
         }
         let before = norm(step);

@@ -41,7 +41,12 @@ fn a_node_with_nothing_opposite_is_named() {
         assert_eq!(measured.err().map(|why| why.at), expected.map(Some), "{direction}");
     }
     let why = NoThickness { at: Some([0.5, 0.5, 0.5]) }.to_string();
-    assert!(why.contains("at (500, 500, 500) mm has no face of a body opposite"), "{why}");
+    assert!(
+        why.contains(
+            "from the design node at (500, 500, 500) mm against its direction meets no opposite face"
+        ),
+        "{why}"
+    );
 }
 
 /// Boxes with names in one of air.
@@ -299,7 +304,8 @@ fn a_wall_has_its_derivative_in_all_four_nodes_and_none_by_the_turn_of_a_triangl
     let body = RegionId(0);
     let opposite = Opposite { distance: 1.0, corners, face: nodes, weights, growth, body, bulge: None };
     let at = |places: &[Point; 4]| wall(&opposite, &|n| places[n.index()]);
-    for (k, (own, derivative)) in at(&places).derivatives.into_iter().flatten().enumerate() {
+    for (k, own) in at(&places).derivatives.into_iter().enumerate() {
+        let (own, derivative) = own.expect("a node");
         assert_eq!(own, NodeId::new(k));
         for d in 0..3 {
             let shifted = |h: f64| {
