@@ -227,6 +227,19 @@ fn where_bounds_cannot_be_kept_the_worst_of_them_is_made_as_small_as_it_can_be()
     }
 }
 
+/// With a wide tolerance a quasi-Newton method ends after a step or two; at the optimum that the shipped run finds nothing like that is left.
+#[test]
+fn a_gain_that_is_small_beside_what_the_gradient_promises_is_warned_of() {
+    let promises = |algorithm, ftol_rel| {
+        let settings = |s| Optimizer { algorithm, ftol_rel, max_evaluations: 40, ..s };
+        let (run, _) = with("shield_quick.toml", &[], settings);
+        assert_eq!(run.stop_reason, StopReason::ObjectiveConverged, "{algorithm:?}");
+        run.warnings.iter().any(|warning| warning.contains("while the gradient still promises"))
+    };
+    assert!(promises(Algorithm::Lbfgs, 0.1));
+    assert!(!promises(Algorithm::Mma, 1e-3));
+}
+
 /// After its first steps the method of moving asymptotes comes to its tolerance at 0.93578, where the gradient promises thirteen times
 /// that: it is not believed, and ends where the other method does.
 #[test]
