@@ -21,7 +21,7 @@ use crate::bh::{PhasorLaw, Tangent};
 use crate::circuit::{Equations, Excitation, SolidRows};
 use crate::element::Complex3;
 use crate::element::tensor::MOST_POINTS;
-use crate::error::{NewtonFailure, NonConvergence, SolverError};
+use crate::error::{NonConvergence, SolverError};
 use crate::linear::gmres::{self, Ended};
 use crate::linear::{Left, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
@@ -31,8 +31,6 @@ use crate::solution::FieldSolution;
 use crate::tangents::Tangents;
 
 mod search;
-
-use search::Monotonicity;
 
 /// Elements whose integrals are held at once: some megabytes.
 const CHUNK: usize = 8192;
@@ -400,26 +398,7 @@ pub(crate) fn solve(
     observer: &mut NewtonObserver<'_>,
 ) -> Result<(FieldSolution, PreparedSystem), SolverError> {
     let problem = Problem::new(model, mesh);
-    let monotonicity = Monotonicity::of(problem.circuits.as_ref());
-    match descend(&problem, monotonicity, (systems, start), observer) {
-        // From the same values again, with the method that was come to.
-        Err(SolverError::Newton { failure: NewtonFailure::Law, .. })
-            if monotonicity == Monotonicity::Natural =>
-        {
-            descend(&problem, Monotonicity::Residual, (systems, start), observer)
-        }
-        ended => ended,
-    }
-}
-
-/// Newton's method with steps of which this becomes shorter.
-fn descend(
-    problem: &Problem<'_>,
-    monotonicity: Monotonicity,
-    (systems, start): (&mut StepSystems<'_>, Option<&[c64]>),
-    observer: &mut NewtonObserver<'_>,
-) -> Result<(FieldSolution, PreparedSystem), SolverError> {
-    let settings = &problem.model.setup().linear_solver;
+    let settings = &model.setup().linear_solver;
     let mut descent = Descent::new(settings.tolerance);
     let (mut iterate, mut iterations, mut steps) = match start {
         Some(values) => (problem.at(values.to_vec()), 0, 0),
@@ -455,11 +434,8 @@ fn descend(
         let (step, LinearSolverReport { iterations: own, .. }) =
             tangent.invert(Side::State, &right_side, &mut system, tolerance)?;
         let goes_on = steps < MOST_STEPS && verdict == Verdict::Falling;
-        let found = if goes_on {
-            problem.search_from(&iterate, &step, monotonicity, (&tangent, &mut system))?
-        } else {
-            None
-        };
+        let found =
+            if goes_on { problem.search_from(&iterate, &step, (&tangent, &mut system))? } else { None };
         let Some((next, length)) = found else {
             let left = [&iterate.values[..], &right_side, &step];
             let is_state = worst <= settings.required && problem.is_rounding(left, (&system, systems));

@@ -18,23 +18,6 @@ const ARMIJO: f64 = 1e-4;
 /// The same where the residual is measured by the step that it asks for.
 const NATURAL: f64 = 0.25;
 
-/// What has to become shorter along a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Monotonicity {
-    /// The step that the residual asks for by the derivative at the start (P. Deuflhard, Newton Methods for Nonlinear Problems,
-    /// chapter 3).
-    Natural,
-    /// The residual.
-    Residual,
-}
-
-impl Monotonicity {
-    /// The first choice: where a capacitance is in series the residual is no error of a field.
-    pub(super) fn of(circuits: Option<&Equations>) -> Self {
-        if circuits.is_some_and(Equations::have_capacitance) { Self::Natural } else { Self::Residual }
-    }
-}
-
 impl Problem<'_> {
     /// A length of a step that lowers the residual, first the one at which it has next to no part along the step: a new iterate with
     /// it. The residual is measured by `Re rᴴS⁻¹r` with the matrix `S` that is nearest to the derivative, as an error of the field:
@@ -70,15 +53,16 @@ impl Problem<'_> {
         Ok(None)
     }
 
-    /// A length of Newton's own step. Where none passes the natural test, as at turning points, the residual decides.
+    /// A length of Newton's own step. Where a capacitance is in series the residual is no error of a field: what the derivative at the
+    /// start makes of the residual has to become shorter (the natural monotonicity of P. Deuflhard, Newton Methods for Nonlinear
+    /// Problems, chapter 3), or, as it may at turning points, does not, and the residual decides.
     pub(super) fn search_from(
         &self,
         from: &Iterate,
         step: &[c64],
-        monotonicity: Monotonicity,
         (tangent, nearest): (&HarmonicTangent, &mut PreparedSystem),
     ) -> Result<Option<(Iterate, f64)>, SolverError> {
-        if monotonicity == Monotonicity::Residual {
+        if !self.circuits.as_ref().is_some_and(Equations::have_capacitance) {
             return self.search(from, step, nearest);
         }
         let before = norm(step);

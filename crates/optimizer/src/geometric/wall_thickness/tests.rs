@@ -43,7 +43,7 @@ fn a_node_with_nothing_opposite_is_named() {
     let why = NoThickness { at: Some([0.5, 0.5, 0.5]) }.to_string();
     assert!(
         why.contains(
-            "from the design node at (500, 500, 500) mm against its direction meets no opposite face"
+            "from the design node at (500.000, 500.000, 500.000) mm against its direction meets no opposite face"
         ),
         "{why}"
     );
