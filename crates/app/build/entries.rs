@@ -35,6 +35,11 @@ pub(crate) fn is_wound(config: &Config, region: &str) -> bool {
     coils_of(config, region).next().is_some()
 }
 
+/// Whether a region is a part of a body of which the force is computed.
+pub(crate) fn is_pushed(config: &Config, region: &str) -> bool {
+    config.forces.iter().any(|body| body.regions.iter().any(|own| own == region))
+}
+
 /// The coil whose solid conductor a region is.
 pub(super) fn solid_coil<'a>(config: &'a Config, region: &str) -> Option<&'a Coil> {
     coils_of(config, region).find(|coil| coil.is_solid())

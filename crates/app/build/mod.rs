@@ -41,7 +41,7 @@ pub(crate) use curves::LARGEST_TABLE;
 pub(crate) use design::{out_of_body, triangulation as design_triangulation};
 pub(crate) use divided_mesh::DividedMesh;
 pub(crate) use elastic_body::{motion_in_words, stiffness_policy};
-pub(crate) use entries::{is_air, is_wound, material};
+pub(crate) use entries::{is_air, is_pushed, is_wound, material};
 pub(crate) use field::{remaining_elements, remaining_nodes};
 pub(crate) use functional::with_cells_written_down;
 pub use motion::{MotionSetup, set_up_motion};

@@ -11,7 +11,7 @@ use fluxmorph_geometry::soundness::{
 };
 use fluxmorph_geometry::tet4::{self, Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{Facet, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 
 use super::entries::material;
 use super::open;
@@ -212,9 +212,10 @@ pub(crate) fn overlap_warning(
         Some(face_key([a?, b?, c?]))
     };
     let designed: HashSet<[NodeId; 3]> = of_full.into_iter().filter_map(on_solved).collect();
-    let is_wall = |facet: &&Facet| facet.outside.is_none() && designed.contains(&face_key(facet.nodes));
-    let walls: Vec<[NodeId; 3]> =
-        original.topology().facets().iter().filter(is_wall).map(|facet| facet.nodes).collect();
+    let is_wall = |face: &[NodeId; 3]| designed.contains(&face_key(*face));
+    let hull = Hull::new(original);
+    let (walls, others): (Vec<[NodeId; 3]>, Vec<_>) =
+        hull.faces().iter().map(|facet| facet.nodes).partition(is_wall);
     if walls.is_empty() {
         return None;
     }
@@ -229,7 +230,7 @@ pub(crate) fn overlap_warning(
         None => format!(
             "the design surface has passed beyond a flat side of the mesh at {}: where that is a plane of symmetry, the mesh overlaps its \
              mirror image, nothing is left there of the body between them, and no number of this design means anything",
-            millimetres(beyond_a_side([original, moved], &walls)?)
+            millimetres(beyond_a_side([original, moved], [&walls, &others])?)
         ),
     };
     Some(format!(
@@ -246,15 +247,13 @@ fn overlap(mesh: &Mesh) -> Option<Point> {
 }
 
 /// Where walls have gone beyond a flat side: one that has all of the mesh before it and none of these walls in it, stays where it is, and
-/// ends at edges: facets of a round outside are none.
-fn beyond_a_side([original, moved]: [&Mesh; 2], walls: &[[NodeId; 3]]) -> Option<Point> {
+/// ends at edges: facets of a round outside are none. The faces are the outer ones, walls and others.
+fn beyond_a_side([original, moved]: [&Mesh; 2], [walls, others]: [&[[NodeId; 3]]; 2]) -> Option<Point> {
     let (size, topology) = (size(original), original.topology());
     let rounding = PLANE * size;
     let of_walls: BTreeSet<NodeId> = walls.iter().flatten().copied().collect();
-    let keys: HashSet<[NodeId; 3]> = walls.iter().copied().map(face_key).collect();
-    let outer = || topology.facets().iter().filter(|facet| facet.outside.is_none()).map(|facet| facet.nodes);
     let mut seen = HashSet::new();
-    let mut found = outer().filter(|face| !keys.contains(&face_key(*face))).filter_map(|face| {
+    others.iter().find_map(|&face| {
         let outwards = normal(original, face);
         let at = dot(outwards, original.point(face[0]));
         let [x, y, z] = outwards;
@@ -266,13 +265,13 @@ fn beyond_a_side([original, moved]: [&Mesh; 2], walls: &[[NodeId; 3]]) -> Option
         let stays = |n: NodeId| of_walls.contains(&n) || !is_in_it(n) || height(moved, n).abs() <= rounding;
         let is_side = topology.nodes().all(|n| height(original, n) <= rounding && stays(n));
         let lies_in_it = |face: &[NodeId; 3]| face.iter().all(|n| is_in_it(*n));
-        let goes_on = |face: [NodeId; 3]| {
+        let goes_on = |face: &[NodeId; 3]| {
             let shares_an_edge = face.iter().filter(|n| is_in_it(**n)).count() == 2;
-            shares_an_edge && dot(normal(original, face), outwards) > ROUND
+            shares_an_edge && dot(normal(original, *face), outwards) > ROUND
         };
-        (is_side && !walls.iter().any(lies_in_it) && !outer().any(goes_on)).then(|| moved.point(passed))
-    });
-    found.next()
+        let ends = !walls.iter().chain(others).any(goes_on);
+        (is_side && ends && !walls.iter().any(lies_in_it)).then(|| moved.point(passed))
+    })
 }
 
 fn contact_fault(source: &SourceMap, mesh: &Mesh, contact: &Contact) -> Diagnostic {
@@ -422,13 +421,13 @@ mod tests {
             let x = mesh.point(*n);
             norm(x) > 0.999 * parameters.outer_radius && x[2] > 0.6 * parameters.outer_radius
         };
-        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-        let walls: Vec<[NodeId; 3]> =
-            outer.map(|facet| facet.nodes).filter(|face| face.iter().all(is_of_cap)).collect();
+        let hull = Hull::new(&mesh);
+        let outer = hull.faces().iter().map(|facet| facet.nodes);
+        let (walls, others): (Vec<_>, Vec<_>) = outer.partition(|face| face.iter().all(is_of_cap));
         let bulged = |n: NodeId| mesh.point(n).map(|c| if is_of_cap(&n) { 1.1 * c } else { c });
         let points = mesh.topology().nodes().map(bulged).collect();
         let moved = Mesh::new(mesh.topology().clone(), points).expect("sound");
         assert!(walls.len() > 4);
-        assert_eq!(beyond_a_side([&mesh, &moved], &walls), None);
+        assert_eq!(beyond_a_side([&mesh, &moved], [&walls, &others]), None);
     }
 }

@@ -130,7 +130,23 @@ pub enum Verdict {
     NotConfirmed,
 }
 
+/// Error bars of a run: twice the estimated errors.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ErrorBars {
+    /// Of the ratio.
+    Ratio(f64),
+    /// Of the initial and of the best value [unit of the objective], which have no ratio.
+    Values([f64; 2]),
+}
+
 impl Accuracy {
+    /// The error bars of a run with this ratio.
+    pub fn error_bars(&self, ratio: f64) -> Option<ErrorBars> {
+        let of = |error: f64| SAFETY * error.abs();
+        let of_values = || Some(ErrorBars::Values(self.error_estimate?.map(of)));
+        self.error_estimate_relative.map(|error| ErrorBars::Ratio(of(error * ratio))).or_else(of_values)
+    }
+
     /// The same with the estimated error of the objective of an analysis.
     #[must_use]
     pub fn of_analysis(self, objective: f64, error: f64) -> Self {

@@ -26,7 +26,8 @@ use std::path::{Path, PathBuf};
 use nix::errno::Errno;
 
 pub use accuracy::{
-    Accuracy, CrossCheck, CurvedFacets, LEAST_LEFT_OUT, Level, SAFETY, Verdict, WHERE_LEFT_OUT, relative_bar,
+    Accuracy, CrossCheck, CurvedFacets, ErrorBars, LEAST_LEFT_OUT, Level, SAFETY, Verdict, WHERE_LEFT_OUT,
+    relative_bar,
 };
 pub(crate) use csv::csv_text;
 pub use design_file::{DesignFile, DesignFileError, RunOfDesign, read_design};

@@ -16,6 +16,7 @@ use fluxmorph_solver::{Boundary, FieldModel, FieldSolution};
 
 use super::Session;
 use super::reported::under;
+use crate::build::is_pushed;
 use crate::config::{Config, ObjectiveKind};
 use crate::files::{LEAST_LEFT_OUT, WHERE_LEFT_OUT};
 use crate::show::Observer;
@@ -49,8 +50,7 @@ pub(super) fn of_conductors(config: &Config, problem: &Problem, analysis: &Analy
         // The one that has most of that sign.
         reasons.sort_by(|a, b| (found.more() * b.0).total_cmp(&(found.more() * a.0)));
         let [(_, why, cure), ..] = reasons;
-        let is_pushed = config.forces.iter().any(|body| body.regions.contains(&found.region));
-        let force = if is_pushed {
+        let force = if is_pushed(config, &found.region) {
             "; force and torque on it are off too, by up to 0.4 times that percentage on the bodies that were looked at"
         } else {
             ""

@@ -7,7 +7,7 @@ use super::styles::{Styles, styled};
 use super::{Started, probes};
 use crate::config::{Constraint, Limit, Objective, each_once};
 use crate::files::{
-    Accuracy, Amplitude, CoilResult, ConstraintResult, CrossCheck, HarmonicResult, LEAST_LEFT_OUT,
+    Accuracy, Amplitude, CoilResult, ConstraintResult, CrossCheck, ErrorBars, HarmonicResult, LEAST_LEFT_OUT,
     MultipoleResult, ObjectiveResult, RunResult, RunStatus, SAFETY, SaturatedRegion, StateErrors, Verdict,
     Verification, VerificationMesh, WHERE_LEFT_OUT,
 };
@@ -178,17 +178,12 @@ fn run(result: &RunResult, named: &Named, styles: &Styles) -> Vec<Row> {
     rows.extend(homogeneity(objective));
     rows.extend(objective.verification.as_ref().and_then(|found| verification(found, named, styles)));
     let Some(accuracy) = &result.accuracy else { return rows };
-    let bar = |error: f64| format!("± {:.1e}", SAFETY * error.abs());
-    match (accuracy.error_estimate_relative, accuracy.error_estimate) {
-        (Some(error), _) => {
-            rows.push(("error bar of F/F0", format!("{} (estimated)", bar(error * ratio))));
+    rows.extend(accuracy.error_bars(*ratio).map(|bars| match bars {
+        ErrorBars::Ratio(bar) => ("error bar of F/F0", format!("± {bar:.1e} (estimated)")),
+        ErrorBars::Values([initial, best]) => {
+            ("error bars", format!("± {initial:.1e}{unit} initial, ± {best:.1e}{unit} best (estimated)"))
         }
-        (None, Some([first, last])) => {
-            let text = format!("{}{unit} initial, {}{unit} best (estimated)", bar(first), bar(last));
-            rows.push(("error bars", text));
-        }
-        (None, None) => {}
-    }
+    }));
     if let Some(is_within) = accuracy.within_tolerance {
         let verdict = if is_within { "kept".to_owned() } else { styled(styles.bad, "NOT KEPT") };
         rows.push(("tolerance", format!("{verdict} after {} refinements of the mesh", accuracy.refinements)));

@@ -13,7 +13,7 @@ use super::words;
 use crate::build::Outline;
 use crate::config::Objective;
 use crate::files::{
-    Accuracy, CrossCheck, ObjectiveResult, RunStatus, SAFETY, StopReason, Verdict, VerificationMesh,
+    Accuracy, CrossCheck, ErrorBars, ObjectiveResult, RunStatus, StopReason, Verdict, VerificationMesh,
 };
 
 /// Title, status, what was done in a sentence, and key figures.
@@ -109,16 +109,16 @@ fn gain_card(data: &RunData, objective: &ObjectiveResult, accuracy: &Accuracy) -
         (Verdict::Confirmed, None) => "confirmed",
         (Verdict::Confirmed, Some(reservation)) => reservation,
     };
-    let bar = |error: f64| number(SAFETY * error.abs(), 2);
-    let bar = match (accuracy.error_estimate_relative, accuracy.error_estimate) {
-        (Some(error), _) => {
-            Some(format!("F / F₀ = {} ± {}", ticks::ratio(objective.ratio), bar(error * objective.ratio)))
+    let bar = accuracy.error_bars(objective.ratio).map(|bars| match bars {
+        ErrorBars::Ratio(bar) => {
+            format!("F / F₀ = {} ± {}", ticks::ratio(objective.ratio), number(bar, 2))
         }
-        (None, errors) => errors.map(|[first, last]| {
+        ErrorBars::Values([of_initial, of_best]) => {
             let [initial, best] = [objective.initial, objective.best].map(|value| number(value, 4));
-            format!("F₀ = {initial} ± {}, F = {best} ± {} {}", bar(first), bar(last), unit(data))
-        }),
-    };
+            let [of_initial, of_best] = [of_initial, of_best].map(|bar| number(bar, 2));
+            format!("F₀ = {initial} ± {of_initial}, F = {best} ± {of_best} {}", unit(data))
+        }
+    });
     let other = accuracy.cross_check.as_ref().map(|check| {
         let CrossCheck { elements, order, ratio, by_estimate, .. } = check;
         let source = if *by_estimate { ", by the estimate" } else { "" };

@@ -325,7 +325,8 @@ impl<'a> Run<'a> {
         self.least_promised().filter(|least| *least > BELIEVED_TOLERANCES * self.settings.least_gain())
     }
 
-    /// What the gradient promises at the best design at least, where something was gained, and the tolerance and much of that gain is less.
+    /// What the gradient promises at the best design at least, where something was gained and this is more than the tolerance and than much
+    /// of that gain.
     fn promised_beside(&self, gain: f64) -> Option<f64> {
         let tolerance = self.settings.least_gain();
         self.promised(1.0).filter(|_| gain > tolerance)?;

@@ -77,8 +77,7 @@ impl ThicknessBound {
         let thickness = shape.measured_thickness()?;
         let (ThicknessLimit::Minimum(limit) | ThicknessLimit::Maximum(limit)) = bound;
         // Two at least, as ln 1 = 0.
-        let counted = thickness.walls(|_| [0.0; 3]).filter(|(_, wall)| counts(bound, wall));
-        let count = counted.count().max(2) as f64;
+        let count = counted(bound, thickness.walls(|_| [0.0; 3])).count().max(2) as f64;
         Ok(Self { bound, sharpness: count.ln() / given_away(limit), linear: None })
     }
 
@@ -169,8 +168,7 @@ impl ThicknessBound {
 
     /// The least thickness [m] on a moved mesh, of a maximum the greatest, without the margin that is kept.
     pub fn extreme(&self, thickness: &WallThickness, mesh: &Mesh) -> f64 {
-        let walls = thickness.walls(|n| mesh.point(n)).filter(|(_, wall)| counts(self.bound, wall));
-        let walls = walls.map(|(_, wall)| wall.thickness);
+        let walls = counted(self.bound, thickness.walls(|n| mesh.point(n))).map(|wall| wall.thickness);
         match self.bound {
             ThicknessLimit::Minimum(_) => walls.fold(f64::INFINITY, f64::min),
             ThicknessLimit::Maximum(_) => walls.fold(f64::NEG_INFINITY, f64::max),
@@ -192,10 +190,8 @@ impl ThicknessBound {
             ThicknessLimit::Maximum(limit) => (1.0, limit),
         };
         let mesh = &moved.mesh;
-        let excess: Vec<(Wall, f64)> = thickness
-            .walls(|n| mesh.point(n))
-            .filter(|(_, wall)| counts(self.bound, wall))
-            .map(|(_, wall)| (wall, sign * (wall.thickness - limit)))
+        let excess: Vec<(Wall, f64)> = counted(self.bound, thickness.walls(|n| mesh.point(n)))
+            .map(|wall| (wall, sign * (wall.thickness - limit)))
             .collect();
         let greatest = excess.iter().fold(f64::NEG_INFINITY, |most, &(_, g)| most.max(g));
         // Relative to the greatest: no exponential overflows.
@@ -226,6 +222,11 @@ fn given_away(limit: f64) -> f64 {
 /// By how much a limit is held on the safe side where it is shown to a method as bounds or linear limits [m].
 pub fn kept_back(limit: f64) -> f64 {
     SAFETY * given_away(limit)
+}
+
+/// The walls that have a say in a limit.
+fn counted(bound: ThicknessLimit, walls: impl Iterator<Item = (usize, Wall)>) -> impl Iterator<Item = Wall> {
+    walls.map(|(_, wall)| wall).filter(move |wall| counts(bound, wall))
 }
 
 /// Whether a wall has a say in a limit: behind design nodes all, before nodes opposite those that are beyond what the others say by
