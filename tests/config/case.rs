@@ -12,8 +12,11 @@
 //! ~ text: the label of another place
 //! = help: notes and advice
 //! > design.grid[0] = 7            for a sound input: a value of the resolved configuration
+//! warning: `steel` has …          … a part of a warning
+//! no warning: turns               … what none of its warnings says; `no warning` alone: it has none
 //! ```
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -30,7 +33,24 @@ const BASES: [&str; 5] = [
 ];
 
 /// How the lines of what is expected begin.
-const EXPECTED: [&str; 6] = ["error: ", "^ ", "~ ", "= ", "|", "> "];
+const EXPECTED: [&str; 8] = ["error: ", "^ ", "~ ", "= ", "|", "> ", "warning: ", "no warning"];
+
+/// A test for each file of a folder of the table, by the function `holds` of the module, and one that finds all files.
+macro_rules! groups {
+    ($folder:literal: $($group:ident),+ $(,)?) => {
+        const GROUPS: &[&str] = &[$(stringify!($group)),+];
+        $(#[test]
+        fn $group() {
+            holds(stringify!($group));
+        })+
+
+        #[test]
+        fn every_file_of_the_table_is_a_test() {
+            assert_eq!($crate::case::names($folder), GROUPS.iter().copied().map(str::to_owned).collect());
+        }
+    };
+}
+pub(crate) use groups;
 
 /// One input.
 #[derive(Clone, Debug, Default)]
@@ -78,6 +98,12 @@ fn is_expected(line: &str) -> bool {
 /// The file of a group, such as `wrong/design`.
 fn path_of(group: &str) -> PathBuf {
     repository("tests/config").join(format!("{group}.txt"))
+}
+
+/// The groups of a folder: the names of its files.
+pub(crate) fn names(folder: &str) -> BTreeSet<String> {
+    let files = fs::read_dir(repository("tests/config").join(folder)).expect("the table");
+    files.map(|file| file.expect("a file").file_name().to_string_lossy().replace(".txt", "")).collect()
 }
 
 /// All cases of a group.
@@ -175,6 +201,10 @@ impl Case {
                 let mesh = Path::new("meshes").join(mesh);
                 fs::copy(repository("configs").join(&mesh), home.join(&mesh)).expect("copied");
             }
+        }
+        let curve = "steel_team20.csv";
+        if config.contains(curve) {
+            fs::copy(repository("configs").join(curve), home.join(curve)).expect("copied");
         }
         let put = |name: &str, marked: &str| {
             let (text, place) = unmarked(name, marked);

@@ -1,7 +1,8 @@
 //! Wrong inputs: what the program says of a configuration, an override or a mesh file that it cannot use, and that no such
 //! file takes more memory, time or room than it may.
 //!
-//! `wrong/*.txt` is the table of wrong inputs, `sound/*.txt` that of sound ones; the form of both is in [`case`].
+//! `wrong/*.txt` is the table of wrong inputs, `warned/*.txt` that of what `check` warns of, `sound.txt` that of the values of
+//! sound inputs; the form of all is in [`case`].
 //! `SNAPSHOTS=overwrite cargo test --release --test config` writes what is expected anew.
 
 mod agreement;
@@ -26,4 +27,5 @@ mod sound;
 mod support;
 mod typos;
 mod verdict;
+mod warned;
 mod wrong;

@@ -103,31 +103,6 @@ fn a_word_of_an_earlier_version_is_read_as_the_new_one_with_a_notice() {
     assert!(setup.warnings.iter().any(|warning| warning == notice), "{:?}", setup.warnings);
 }
 
-/// What the set-up of a shipped configuration warns of with a change.
-fn warnings_of(name: &str, change: &str) -> String {
-    let (config, source) =
-        Config::from_file(&repository("configs").join(name), &[change.to_owned()]).expect("sound");
-    set_up(&config, &source, Mode::Optimisation).expect("a sound device").warnings.join("\n")
-}
-
-#[test]
-fn lengths_beyond_the_mesh_are_said_by_the_set_up() {
-    let said = warnings_of("shield_quick.toml", "design.upper=10");
-    assert!(said.contains("design.upper is 10 m, more than the whole mesh"), "{said}");
-}
-
-#[test]
-fn a_winding_that_a_surface_cuts_has_no_force_across_it() {
-    // The upper half of a winding, and the core, whose own half has none either, but no turns that feel another one.
-    let of = |region: &str| {
-        let forces = format!("forces=[{{name=\"half\", regions=[\"{region}\"]}}]");
-        warnings_of("inductor.toml", &forces)
-    };
-    let said = of("coil");
-    assert!(said.contains("the surface `middle` cuts the winding `half`") && !said.contains("  "), "{said}");
-    assert!(!of("core").contains("cuts the winding"), "{}", of("core"));
-}
-
 /// The far side of the shell that is put around a mesh has its condition: no patch of the outside lies on it.
 #[test]
 fn space_that_is_open_is_no_side_without_a_condition() {

@@ -1,35 +1,15 @@
 //! Every wrong input is refused by the real binary at the marked place, with the message that the table holds.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fs;
 
-use crate::case::{Case, Marked, overwrite, read};
+use crate::case::{Case, Marked, groups, overwrite, read};
 use crate::program::{check, limited};
 use crate::support::program::folder;
-use crate::support::repository;
-
-/// A test for each file of `wrong`.
-macro_rules! groups {
-    ($($group:ident),+ $(,)?) => {
-        const GROUPS: &[&str] = &[$(stringify!($group)),+];
-        $(#[test]
-        fn $group() {
-            holds(stringify!($group));
-        })+
-    };
-}
 
 groups! {
-    curves, design, field, keys, loads, looks, many, mesh, mesh_files, motion, names_and_paths, names_and_places, objective, optimizer,
-    overrides, sizes, sources, syntax,
-}
-
-#[test]
-fn every_file_of_the_table_is_a_test() {
-    let files = fs::read_dir(repository("tests/config/wrong")).expect("the table");
-    let names: BTreeSet<String> =
-        files.map(|file| file.expect("a file").file_name().to_string_lossy().replace(".txt", "")).collect();
-    assert_eq!(names, GROUPS.iter().map(|group| (*group).to_owned()).collect());
+    "wrong": curves, design, elements, field, forces, keys, loads, looks, many, mesh, mesh_files, motion, names_and_paths,
+    names_and_places, objective, optimizer, overrides, sizes, sources, syntax,
 }
 
 /// Bases that are sound as a text, and refused once their mesh is known: for faults that show before.

@@ -5,8 +5,8 @@ use fluxmorph::build::{Mode, set_up};
 use fluxmorph_optimizer::problem::{
     Analysis, Derivatives, NoProgress, Problem, SEARCH_ADJOINT_TOLERANCE, SolverCache,
 };
-use fluxmorph_solver::FieldModel;
 use fluxmorph_solver::linear::{LinearSolverCache, Method};
+use fluxmorph_solver::{FieldModel, LoadCase};
 
 use crate::problems::variables;
 use crate::support::{changed, config, norm, relative_difference, repository_text, setup, setup_of};
@@ -181,7 +181,9 @@ fn the_part_of_a_factor_that_is_kept_changes_no_bit_of_a_result() {
 fn a_factor_serves_a_frequency_close_by() {
     let problem = problem(MESHED, &[REUSED]);
     let (mesh, at_60) = (problem.original(), &problem.states()[0]);
-    let at_61 = at_60.at_frequency(mesh, 61.0).expect("a frequency above zero");
+    let at_61 = at_60
+        .at_load_case(mesh, &LoadCase { frequency: 61.0, ..at_60.load_case() })
+        .expect("a frequency above zero");
     let solved = |model: &FieldModel, memory: &mut LinearSolverCache| {
         let mut system = model.prepare_with(model.assemble(mesh), memory).expect("a regular system");
         let field = model.solve_prepared(&mut system, &model.load(mesh)).expect("it converges");

@@ -16,7 +16,6 @@ mod in_memory;
 mod interrupted_motions;
 mod intruders;
 mod kills;
-mod lint;
 mod page;
 mod races;
 mod reopened;

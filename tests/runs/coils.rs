@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::support::folder::{read_json, read_text};
 use crate::support::program::{Finished, fluxmorph, folder};
-use crate::support::{changed, repository, with_mesh_file};
+use crate::support::{changed, with_mesh_file};
 
 pub(crate) const COILS: &str = include_str!("../support/coils.toml");
 
@@ -272,23 +272,6 @@ fn an_open_and_a_short_circuited_coil_are_two_loads_of_one_device() {
     println!("{found:?} {current:?}");
     assert!(deviation([found, current]) < 1e-9);
     assert_eq!(result["coils"], result["states"][0]["coils"]);
-}
-
-/// A copy of a coil that kept its region: go and return in one bar.
-#[test]
-fn two_currents_in_one_region_are_asked_about() {
-    let home = folder();
-    let text = read_text(&repository("configs/busbar.toml"));
-    let start = text.find("[[coils]]").expect("a coil");
-    let coil = &text[start..text.find("[boundaries]").expect("boundaries")];
-    let back = coil
-        .replace("name = \"bar\"", "name = \"back\"")
-        .replace("[\"z_min\", \"z_max\"]", "[\"z_max\", \"z_min\"]");
-    let config = home.path().join("twice.toml");
-    std::fs::write(&config, text.replace(coil, &format!("{coil}{back}"))).expect("written");
-    let json = fluxmorph(&[&"check", &config, &"--json"]).json();
-    let said = json["warnings"].to_string();
-    assert!(said.contains("`bar` and `back` fill the same region `bar`"), "{said}");
 }
 
 /// A right-angled bend between planes of equal potential.

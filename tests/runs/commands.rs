@@ -191,40 +191,6 @@ fn a_probe_that_the_moving_plate_swallows_is_left_out_of_the_result() {
     }
 }
 
-/// Where B jumps, a point on the face has the field of one side.
-#[test]
-fn a_probe_on_a_face_of_iron_or_at_its_edge_is_asked_about() {
-    let of_model = |model: &str, point: &str, permeability: &str| {
-        let model = format!("regions.plate.model={model}");
-        let point = format!("probes[0].points=[[{point}]]");
-        let material = format!("materials.steel.relative_permeability={permeability}");
-        let further = ["--json", "--set", &point, "--set", &material, "--set", &model];
-        let checked = finish(command(&[&"check", &quick()]).args(further)).exits_with(0).json();
-        checked["warnings"].to_string()
-    };
-    let warnings = |point: &str, permeability: &str| of_model("volume", point, permeability);
-    let [on_the_face, beside_the_edge] = ["0.01, 0.01, -0.01", "0.1203, 0.01, -0.0103"];
-    let named = "between `remesh` and `plate`, where B jumps: it is that in `remesh`";
-    assert!(warnings(on_the_face, "100").contains(named));
-    assert!(warnings(beside_the_edge, "100").contains("is 0.424 mm from an edge of iron"));
-    for model in ["impedance", "perfect"] {
-        assert!(
-            of_model(model, beside_the_edge, "1").contains("is 0.424 mm from an edge of iron"),
-            "{model}"
-        );
-    }
-    let silent = [
-        (on_the_face, "1"),
-        (beside_the_edge, "1"),
-        ("0.01, 0.01, -0.011", "100"),
-        ("0.01, 0.01, -0.009", "100"),
-    ];
-    for (point, permeability) in silent {
-        let all = warnings(point, permeability);
-        assert!(!all.contains("B jumps") && !all.contains("edge of iron"), "{point}, {permeability}: {all}");
-    }
-}
-
 #[test]
 fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
     let home = folder();
@@ -247,29 +213,4 @@ fn an_objective_that_is_to_be_large_and_is_negative_is_asked_about() {
     let term =
         |weight: &str| format!("[[objective.terms]]\n{own}direction = [0, 0, -1]\nweight = {weight}\n");
     assert!(!asks(&changed(&text, &[(own, "")]), &[term("1"), term("-2")].concat()));
-}
-
-#[test]
-fn nodal_elements_beside_iron_are_refused_or_warned_of_with_the_cure() {
-    let pole = repository("configs/pole.toml");
-    let command = |command: &str, elements: &str, order: u8, permeability: u32| {
-        let elements = format!("analysis.elements={elements}");
-        let order = format!("analysis.order={order}");
-        let iron = format!("materials.iron.relative_permeability={permeability}");
-        fluxmorph(&[&command, &pole, &"--set", &elements, &"--set", &order, &"--set", &iron])
-    };
-    let iron = |elements: &str, order: u8, permeability: u32| command("check", elements, order, permeability);
-    let doubtful = ["region `iron`", "analysis.elements = \"edge\""];
-    iron("nodal", 1, 8).with(0, &[&doubtful[..], &["wrong by factors"]].concat());
-    iron("nodal", 2, 1000).with(0, &[&doubtful[..], &["most of its flux"]].concat());
-    for (order, permeability) in [(1, 12), (2, 2000)] {
-        let says = ["lose more than a tenth of the flux beside iron", "(`iron`)", "elements = \"edge\""];
-        for what in ["check", "solve", "run"] {
-            command(what, "nodal", order, permeability).with(3, &says);
-        }
-    }
-    iron("edge", 1, 2000).with(0, &["region `iron`", "analysis.order = 2"]);
-    for order in [1, 2] {
-        assert!(!iron("edge", order, 1000).with(0, &[]).stderr.contains("warning: region `iron`"));
-    }
 }

@@ -1,9 +1,8 @@
-//! What is said of skins that the mesh does not carry, and of variables that it does not follow.
+//! What is said of skins that the mesh does not carry.
 
 use serde_json::Value;
 
 use super::plausible::{set, texts};
-use crate::support::changed;
 use crate::support::folder::{RunFolder, number, read_text};
 use crate::support::program::{command, finish, folder};
 use crate::support::shield::quick;
@@ -70,52 +69,4 @@ fn of_many_frequencies_the_worst_skin_is_warned_of() {
     let found = texts(&summary["warnings"]);
     assert_eq!(found.matches("too thick for the skin depth").count(), 1, "{found}");
     assert!(found.contains("at 6000 Hz, the worst of 3 frequencies: region `plate`"), "{found}");
-}
-
-#[test]
-fn a_control_grid_that_the_mesh_does_not_follow_is_asked_about() {
-    let fine = texts(&check(&["design.grid=[7, 60]"])["warnings"]);
-    assert!(fine.contains("design.grid has a point every 4.068 mm along y"), "{fine}");
-    assert!(!texts(&check(&["design.grid=[7, 13]"])["warnings"]).contains("design.grid"));
-}
-
-#[test]
-fn a_filter_that_reaches_no_neighbour_is_asked_about() {
-    let said = |radius: &str| {
-        let text = read_text(&quick());
-        let (before, after) = text.split_once("grid = [7, 13]").expect("its design");
-        let home = folder();
-        let config = home.path().join("filtered.toml");
-        std::fs::write(&config, format!("{before}filter_radius = \"{radius}\"{after}")).expect("written");
-        texts(&finish(&mut command(&[&"check", &config, &"--json"])).exits_with(0).json()["warnings"])
-    };
-    let blind = said("20 um");
-    assert!(blind.contains("design.filter_radius is 0.0200 mm, and no node of the surface"), "{blind}");
-    assert!(!said("20 mm").contains("filter_radius"));
-}
-
-/// An impedance surface has to be possible wherever the mesh is too coarse, and where it is not: the plate is 10 mm thick.
-#[test]
-fn a_model_is_advised_where_it_serves_all_frequencies() {
-    let home = folder();
-    let config = home.path().join("plate.toml");
-    let said = |frequencies: &str, model: &str| {
-        let frequencies = format!("frequencies = [{frequencies}]");
-        let text = changed(&read_text(&quick()), &[("frequency = \"60 Hz\"", &frequencies)]);
-        std::fs::write(&config, text).expect("written");
-        let model = format!("regions.plate.model={model}");
-        let plain = "materials.steel={ relative_permeability = 1, conductivity = \"3.5e7 S/m\" }";
-        let overrides = [IRON[0], plain, "design.lower=\"-1 mm\"", &model, IRON[2]];
-        let overrides = &overrides[..if model.ends_with("volume") { 5 } else { 4 }];
-        let checked = finish(command(&[&"check", &config, &"--json"]).args(set(overrides)));
-        texts(&checked.exits_with(0).json()["warnings"])
-    };
-    let surface = "or use model = \"impedance\"";
-    assert!(said("\"20 kHz\", \"50 kHz\"", "volume").contains(surface));
-    for frequencies in ["\"50 Hz\", \"50 kHz\"", "0, \"50 kHz\""] {
-        let found = said(frequencies, "volume");
-        assert!(found.contains("Refine the skin") && !found.contains(surface), "{frequencies}: {found}");
-    }
-    let found = said("\"1 Hz\", \"50 kHz\"", "impedance");
-    assert!(found.contains("these are too thick for the skin depth at 50000 Hz"), "{found}");
 }

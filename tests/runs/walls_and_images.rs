@@ -1,7 +1,6 @@
 //! What lies behind the outer faces of a mesh: walls that cut a field off, and images of what symmetry planes cut.
 
 use std::f64::consts::FRAC_1_SQRT_2;
-use std::path::Path;
 use std::sync::Arc;
 
 use fluxmorph_geometry::generate::Grid;
@@ -10,17 +9,11 @@ use fluxmorph_geometry::tet4::{Point, norm};
 use fluxmorph_geometry::{Mesh, RegionId};
 use serde_json::Value;
 
-use super::plausible::{set, texts};
-use crate::support::folder::{number, read_json, read_text};
+use super::plausible::set;
+use crate::support::folder::{number, read_json};
 use crate::support::program::{command, finish, folder};
 use crate::support::shield::quick;
-use crate::support::{changed, repository};
-
-/// Whether `check` warns of something with some overrides.
-fn warns_of(config: &Path, overrides: &[&str], text: &str) -> bool {
-    let json = finish(command(&[&"check", &config, &"--json"]).args(set(overrides))).exits_with(0).json();
-    texts(&json["warnings"]).contains(text)
-}
+use crate::support::{changed, repository, repository_text};
 
 /// The wall beside the coil is a wall, although an element that the coil meets reaches it.
 #[test]
@@ -235,102 +228,12 @@ fn curved_and_oblique_walls_are_as_near_as_others() {
     same("a ball", whole, &ball, 0.05 - 0.04f64.hypot(0.005));
 }
 
-/// The field is left normal to it, as to a flux-normal one.
-#[test]
-fn a_side_without_condition_that_cuts_a_magnet_is_named() {
-    let home = folder();
-    let sphere = read_text(&repository("configs/sphere.toml"));
-    let said = |planes: &str| {
-        let (before, rest) = sphere.split_once("flux_parallel").expect("conditions");
-        let (_, after) = rest.split_once("\n\n").expect("tables behind them");
-        let path = home.path().join("magnet.toml");
-        let conditions = format!("flux_parallel = [{planes}]\nflux_normal = [\"z_min\"]");
-        std::fs::write(&path, format!("{before}{conditions}\n\n{after}")).expect("written");
-        let magnet = ["analysis.frequency=0", "regions.sphere.remanence=[0, 1, 1]"];
-        warns_of(&path, &magnet, "is cut by an outer side without condition, at which")
-    };
-    assert!(said("\"y_min\", \"outer\"") && !said("\"x_min\", \"y_min\""));
-}
-
-/// Of a component that all planes of symmetry keep the mean is the device's; of another one only that of the meshed part. The pole's
-/// observation ends at two flux-parallel planes and at a flux-normal one, which keep the component along z.
-#[test]
-fn the_homogeneity_of_a_component_that_images_change_is_asked_about() {
-    let home = folder();
-    let pole = read_text(&repository("configs/pole.toml"));
-    let said = |direction: &str| {
-        let objective = format!("kind = \"homogeneity\"\ndirection = {direction}");
-        let target = "target = [0.0, 0.0, \"0.5 T\"]\n";
-        let text = changed(&pole, &[("kind = \"target_field\"", &objective), (target, "")]);
-        let path = home.path().join("pole.toml");
-        std::fs::write(&path, text).expect("written");
-        warns_of(&path, &[], "behind `x_min` the images of `observation` have another component")
-    };
-    assert!(said("[1, 0, 1]") && said("[1, 0, 0]") && !said("[0, 0, 1]"));
-}
-
-/// A ring of 30 mm radius over the plane z = 0 of a box, off the middle, with a region and a ball at the plane.
-const OVER_A_PLANE: &str = r#"
-[mesh]
-generator = "boxes"
-[mesh.boxes]
-box = [[-0.1, -0.1, 0], [0.1, 0.1, 0.1]]
-growth = 1.8
-[[mesh.boxes.regions]]
-name = "seen"
-box = [[-0.02, -0.02, 0], [0.02, 0.02, 0.02]]
-size = 0.01
-[[mesh.boxes.surfaces]]
-name = "plane"
-box = [[-0.1, -0.1, 0], [0.1, 0.08, 0]]
-[[mesh.boxes.surfaces]]
-name = "strip"
-box = [[-0.1, 0.08, 0], [0.1, 0.1, 0]]
-[[mesh.boxes.sizes]]
-axis = "y"
-from = 0.08
-to = 0.1
-
-[analysis]
-frequency = 0
-
-[[coils]]
-name = "ring"
-shape = "circular"
-ampere_turns = 1e4
-center = [0.03, 0, 0.03]
-radius = 0.03
-width = 0.01
-height = 0.01
-
-[boundaries]
-flux_parallel = ["x_min", "x_max", "y_min", "y_max", "z_max"]
-flux_normal = ["plane", "strip"]
-
-[[multipoles]]
-name = "ball"
-shape = "ball"
-radius = 0.012
-order = 2
-
-[objective]
-kind = "homogeneity"
-region = "seen"
-compare = "vector"
-
-[accuracy]
-estimate = false
-
-[output]
-fields = "none"
-"#;
-
 /// What holds in a plane far from a ball is nothing to its images, and what a face is called nothing to the mean of the device.
 #[test]
 fn planes_are_judged_by_their_faces_and_not_by_their_names() {
     let home = folder();
     let config = home.path().join("plane.toml");
-    std::fs::write(&config, OVER_A_PLANE).expect("written");
+    std::fs::write(&config, repository_text("tests/config/bases/over_a_plane.toml")).expect("written");
     let of = |normal: &str, parallel: &str| {
         let conditions = [
             format!("boundaries.flux_normal=[{normal}]"),
@@ -368,24 +271,6 @@ fn planes_are_judged_by_their_faces_and_not_by_their_names() {
         text.contains("a plane across z that is flux-parallel and flux-normal within its radius"),
         "{text}"
     );
-}
-
-/// The octant of a quadrupole: what its images leave of the mean is nothing.
-#[test]
-fn a_device_without_a_mean_is_named() {
-    let home = folder();
-    let config = home.path().join("octant.toml");
-    let planes = [
-        ("flux_normal = [\"plane\", \"strip\"]", "flux_normal = [\"x_min\", \"y_min\"]"),
-        ("[\"x_min\", \"x_max\", \"y_min\", \"y_max\", \"z_max\"]", "[\"plane\", \"strip\", \"x_max\"]"),
-        ("[-0.02, -0.02, 0]", "[-0.1, -0.1, 0]"),
-        ("[[multipoles]]\nname = \"ball\"\nshape = \"ball\"\nradius = 0.012\norder = 2\n", ""),
-    ];
-    std::fs::write(&config, changed(OVER_A_PLANE, &planes)).expect("written");
-    let said = |compare: &str| {
-        warns_of(&config, &[compare], "leave the mean of B over the whole device no direction")
-    };
-    assert!(said("objective.compare=\"vector\"") && !said("objective.compare=\"modulus\""));
 }
 
 /// Behind the surface of a closed iron shell there is no field; of 1 mT around it 5.17 µT come through four skin depths.

@@ -50,7 +50,6 @@ pub(super) fn remesh_setup(
         law,
         design_nodes: design_nodes.to_vec(),
         boundaries,
-        fixed_nodes: Vec::new(),
         solver: SolverChoice::Automatic,
         ownership: None,
     })

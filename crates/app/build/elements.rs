@@ -6,7 +6,7 @@
 use fluxmorph_geometry::{Mesh, Millimetres, Readable};
 use fluxmorph_solver::audit::NodalErrors;
 
-use super::entries::material;
+use super::entries::{has_curve, material};
 use super::field;
 use super::skin::Audited;
 use crate::config::{Config, Diagnostic, ElementOrder, Elements, RegionModel, SourceMap};
@@ -53,7 +53,7 @@ pub(super) fn faults(
         let message = format!(
             "nodal elements of order {} lose more than a tenth of the flux beside iron of the relative permeability {} (`{}`{}): {}",
             u8::from(config.analysis.order),
-            Readable(iron.relative_permeability),
+            iron.permeability(),
             iron.region,
             iron.shielding(),
             limits.wrong
@@ -166,9 +166,17 @@ struct Iron<'a> {
     relative_permeability: f64,
     /// Less than all of it where eddy currents keep the flux out.
     carrying: f64,
+    /// Whether the permeability is what stands for a curve.
+    is_of_curve: bool,
 }
 
 impl Iron<'_> {
+    /// What there is to say of the permeability, for which that of a curve has no one number.
+    fn permeability(&self) -> String {
+        let or_more = if self.is_of_curve { " or more along its curve" } else { "" };
+        format!("{}{or_more}", Readable(self.relative_permeability))
+    }
+
     /// What there is to say beside the permeability.
     fn shielding(&self) -> String {
         if self.carrying < self.relative_permeability {
@@ -213,7 +221,7 @@ fn strongest_iron<'a>(config: &Config, mesh: &'a Mesh, audits: &[Audited]) -> Op
             own.map(|audited| audited.audit.carrying_permeability().min(relative_permeability))
                 .fold(0.0, f64::max)
         };
-        Iron { region, relative_permeability, carrying }
+        Iron { region, relative_permeability, carrying, is_of_curve: has_curve(config, region) }
     });
     iron.max_by(|a, b| a.carrying.total_cmp(&b.carrying))
 }
@@ -225,7 +233,7 @@ fn beside_iron(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Option<Strin
             format!(
                 "region `{}` has the relative permeability {}{}, and nodal elements of order {}: {}. Set {CURE}",
                 iron.region,
-                Readable(iron.relative_permeability),
+                iron.permeability(),
                 iron.shielding(),
                 u8::from(config.analysis.order),
                 limits.wrong
@@ -238,7 +246,7 @@ fn beside_iron(config: &Config, mesh: &Mesh, audits: &[Audited]) -> Option<Strin
             "region `{}` has the relative permeability {}, and edge elements of order 1 have one B an element: in slits and \
              thin walls of it that one or two elements cross B may be off by 10 to 20 %. Refine them, or set analysis.order = 2",
             iron.region,
-            Readable(iron.relative_permeability)
+            iron.permeability()
         )
     })
 }

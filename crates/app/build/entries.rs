@@ -2,19 +2,31 @@
 
 use fluxmorph_solver::Material;
 
-use crate::config::{Coil, CoilShape, Config};
+use crate::config::{self, Coil, CoilShape, Config};
 
-/// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron; the skin audit and the
-/// field have that of the curve.
+/// What stands for the permeability of steel with a B–H curve where all that counts is that it is iron, but for less at its origin; the
+/// skin audit and the field have that of the curve.
 const OF_A_CURVE: f64 = 1000.0;
 
 /// The material of a region; air where the configuration says nothing.
 pub(crate) fn material(config: &Config, region: &str) -> Material {
     let entry = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
+    let permeability = |m: &config::Material| match m.saturation {
+        Some(_) => m.relative_permeability.min(OF_A_CURVE),
+        None if m.saturates() => OF_A_CURVE,
+        None => m.relative_permeability,
+    };
     entry.map_or(Material::AIR, |m| Material {
-        relative_permeability: if m.saturates() { OF_A_CURVE } else { m.relative_permeability },
+        relative_permeability: permeability(m),
         conductivity: m.conductivity,
     })
+}
+
+/// Whether a region is iron with a B–H curve, whose permeability here stands for that of the curve.
+pub(crate) fn has_curve(config: &Config, region: &str) -> bool {
+    let material = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
+    material
+        .is_some_and(|m| m.saturates() && (m.saturation.is_none() || m.relative_permeability > OF_A_CURVE))
 }
 
 /// Whether a region is a permanent magnet.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::parallel::{Krylov, Ownership, SubSolver};
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 use fluxmorph_optimizer::Error as OptimizerError;
 use fluxmorph_solver::coil::{
@@ -43,13 +44,17 @@ pub(super) fn without_replaced_regions(
     for (name, _) in &replaced {
         mesh = mesh.without_region(full.topology().region(name)?)?.0;
     }
-    // Node numbers are final only now: expose each surface on the last mesh through the positions it kept.
-    let mut conductors = Vec::new();
-    for (name, law) in replaced {
-        let surface = exposed_surface(full, &mesh, &name)?;
-        conductors.push(Conductor { name, surface, law });
-    }
-    Ok((mesh, conductors))
+    // Node numbers are final only now.
+    let old_of = remaining_nodes(config, full.topology());
+    let exposed = |(name, law): (String, SurfaceLaw)| {
+        let removed = full.topology().boundary(full.topology().region(&name)?);
+        let removed: HashSet<_> = removed.into_iter().map(face_key).collect();
+        let outer = mesh.topology().outer_facets().map(|facet| facet.nodes);
+        let surface = outer.filter(|nodes| removed.contains(&face_key(nodes.map(|n| old_of[n.index()]))));
+        Ok(Conductor { name, surface: surface.collect(), law })
+    };
+    let conductors: Result<_, Error> = replaced.into_iter().map(exposed).collect();
+    Ok((mesh, conductors?))
 }
 
 /// The nodes that are left without the regions that their surfaces replace, ascending: those of the mesh that is solved on,
@@ -66,42 +71,6 @@ pub(crate) fn remaining_nodes(config: &Config, full: &Topology) -> Vec<NodeId> {
 pub(crate) fn remaining_elements(config: &Config, full: &Topology) -> Vec<ElementId> {
     let meshed: Vec<bool> = full.region_names().iter().map(|name| config.is_meshed(name)).collect();
     full.elements().filter(|e| meshed[full.region_of()[e.index()].index()]).collect()
-}
-
-/// The faces of `mesh` that the region `name` of `full` covered, oriented out of `mesh`.
-fn exposed_surface(
-    full: &Mesh,
-    mesh: &Mesh,
-    name: &str,
-) -> Result<Vec<[fluxmorph_geometry::NodeId; 3]>, Error> {
-    let region = full.topology().region(name)?;
-    let key = |p: [f64; 3]| p.map(f64::to_bits);
-    let faces: HashSet<_> = full
-        .topology()
-        .facets()
-        .iter()
-        .filter(|f| {
-            let at = |e: fluxmorph_geometry::ElementId| full.topology().region_of()[e.index()] == region;
-            f.outside.is_some_and(|outside| at(f.inside) != at(outside))
-        })
-        .map(|f| {
-            let mut corners = f.nodes.map(|n| key(full.point(n)));
-            corners.sort_unstable();
-            corners
-        })
-        .collect();
-    Ok(mesh
-        .topology()
-        .facets()
-        .iter()
-        .filter(|f| f.outside.is_none())
-        .filter(|f| {
-            let mut corners = f.nodes.map(|n| key(mesh.point(n)));
-            corners.sort_unstable();
-            faces.contains(&corners)
-        })
-        .map(|f| f.nodes)
-        .collect())
 }
 
 /// Conductors replaced by their surfaces that touch a meshed conductor: what flows from one to the other is in neither.

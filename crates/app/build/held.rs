@@ -43,8 +43,7 @@ pub(super) fn sides(mesh: &Mesh, is_wanted: impl Fn([NodeId; 3]) -> bool) -> Vec
     let rounding = IN_PLANE * norm(sub(upper, lower));
     let mut planes: Vec<Plane> = Vec::new();
     let mut found = Vec::new();
-    let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-    for nodes in outer.map(|facet| facet.nodes).filter(|nodes| is_wanted(*nodes)) {
+    for nodes in mesh.topology().outer_facets().map(|facet| facet.nodes).filter(|nodes| is_wanted(*nodes)) {
         let vertices = nodes.map(|node| mesh.point(node));
         let lies_in = |plane: &&Plane| vertices.iter().all(|&x| plane.height(x, rounding) == 0.0);
         let known = planes.iter().position(|plane| lies_in(&plane)).unwrap_or_else(|| {

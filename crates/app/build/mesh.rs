@@ -180,8 +180,7 @@ fn faces_of_region(topology: &Topology, name: &str, path: &str) -> Vec<String> {
 
 /// Every condition on a surface that does not lie at the outside of the mesh.
 pub(super) fn inner_faults(config: &Config, source: &SourceMap, topology: &Topology) -> Vec<Diagnostic> {
-    let outer: HashSet<[NodeId; 3]> =
-        topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| face_key(f.nodes)).collect();
+    let outer: HashSet<[NodeId; 3]> = topology.outer_facets().map(|f| face_key(f.nodes)).collect();
     surface_names(config)
         .into_iter()
         .filter(|(path, _)| is_condition(path))

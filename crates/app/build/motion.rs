@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
 use fluxmorph_geometry::box_tree::BoxTree;
-use fluxmorph_geometry::tet4::{Point, dot, norm, sub};
+use fluxmorph_geometry::depth::nearest_on_triangle;
+use fluxmorph_geometry::tet4::{Point, norm, sub};
 use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 use fluxmorph_remesh::RemeshSetup;
 
@@ -137,7 +138,7 @@ fn nodes_of(
             ("surface", triangles.flatten().copied().collect())
         }
         Target::Line([start, end]) => {
-            ("line", chosen(&|point| distance_to_line(point, [*start, *end]) <= near))
+            ("line", chosen(&|point| nearest_on_triangle(point, &[*start, *end, *end]).1 <= near))
         }
         Target::Box([low, high]) => {
             let inside = |p: Point| (0..3).all(|d| low[d] - near <= p[d] && p[d] <= high[d] + near);
@@ -157,14 +158,6 @@ fn nodes_of(
         return Err(Box::new(fault.expected(range)));
     }
     Ok(nodes)
-}
-
-/// Distance of a point from the line between two others [m].
-pub(super) fn distance_to_line(point: Point, [start, end]: [Point; 2]) -> f64 {
-    let (along, from) = (sub(end, start), sub(point, start));
-    let square = dot(along, along);
-    let t = if square > 0.0 { (dot(from, along) / square).clamp(0.0, 1.0) } else { 0.0 };
-    norm(std::array::from_fn(|d| from[d] - t * along[d]))
 }
 
 /// The nodes nearest to the points of a list; a fault where one is not `near`.

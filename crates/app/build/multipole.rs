@@ -3,7 +3,7 @@
 use std::collections::HashSet;
 
 use fluxmorph_geometry::box_tree::AxisBox;
-use fluxmorph_geometry::tet4::{Point, barycentric};
+use fluxmorph_geometry::depth::nearest_on_triangle;
 use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{Mesh, millimetres};
 use fluxmorph_optimizer::problem::Problem;
@@ -14,7 +14,6 @@ use fluxmorph_solver::{FieldModel, Functional, SolverError};
 
 use super::functional::follow;
 use super::locate_error::DiagnosticSink;
-use super::motion::distance_to_line;
 use super::references::functionals;
 use super::soundness::faces_of;
 use crate::config::{self, Config, Diagnostic, ExpansionShape, MultipoleSet, ObjectiveKind, SourceMap};
@@ -230,7 +229,7 @@ impl Planes {
         let replaced: HashSet<_> = replaced.map(|face| face_key(*face)).collect();
         // By axis: whether faces are flux-parallel, flux-normal, and so without a word.
         let mut found = [[false; 3]; 3];
-        for facet in mesh.topology().facets().iter().filter(|facet| facet.outside.is_none()) {
+        for facet in mesh.topology().outer_facets() {
             let (key, corners) = (face_key(facet.nodes), facet.nodes.map(|node| mesh.point(node)));
             let off = |axis: usize| {
                 corners.iter().map(|x| (x[axis] - set.center[axis]).abs()).fold(0.0_f64, f64::max)
@@ -245,7 +244,7 @@ impl Planes {
             } else {
                 2
             };
-            found[axis][kind] |= reaches(&corners, set);
+            found[axis][kind] |= nearest_on_triangle(set.center, &corners).1 < set.radius;
         }
         let mirrors = (0..3).filter(|&axis| found[axis][0] || found[axis][1]).map(|axis| {
             let across = if found[axis][0] { -1.0 } else { 1.0 };
@@ -254,12 +253,4 @@ impl Planes {
         let is_divided = |axis: &usize| found[*axis][0] && (found[*axis][1] || found[*axis][2]);
         Self { mirrors: mirrors.collect(), divided: (0..3).find(is_divided) }
     }
-}
-
-/// Whether a triangle in a plane through the centre of an expansion comes within its radius.
-fn reaches(corners: &[Point; 3], set: &MultipoleSet) -> bool {
-    let [a, b, c] = *corners;
-    let nearest = [[a, b], [b, c], [c, a]].map(|edge| distance_to_line(set.center, edge));
-    nearest.into_iter().any(|distance| distance < set.radius)
-        || barycentric(corners, set.center).iter().all(|weight| *weight >= 0.0)
 }

@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
 use fluxmorph_geometry::curved::SMOOTH;
+use fluxmorph_geometry::depth::nearest_on_triangle;
 use fluxmorph_geometry::locate::{holders, locate};
 use fluxmorph_geometry::tet4::{Point, dot, volume};
+use fluxmorph_geometry::topology::triangle_edges;
 use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, millimetres};
 
 use super::entries::material;
-use super::motion::distance_to_line;
 use super::open;
 use super::soundness::normal;
 use crate::config::{Config, Diagnostic, ElementOrder, Probe, SourceMap};
@@ -130,7 +131,10 @@ impl<'a> Edges<'a> {
         let mut least = f64::INFINITY;
         self.tree.for_each(
             |around| around.square_distance(point) < reach * reach,
-            |k| least = least.min(distance_to_line(point, self.ends[k])),
+            |k| {
+                let [a, b] = self.ends[k];
+                least = least.min(nearest_on_triangle(point, &[a, b, b]).1);
+            },
         );
         (least < reach).then_some((least / size, size))
     }
@@ -175,11 +179,10 @@ fn sharp_edges(config: &Config, mesh: &Mesh) -> Vec<[Point; 2]> {
         if !jumps[inside][outside] {
             continue;
         }
-        let [a, b, c] = facet.nodes;
         let out_of_the_first = if inside < outside { 1.0 } else { -1.0 };
         let normal = normal(mesh, facet.nodes).map(|component| out_of_the_first * component);
-        for [m, n] in [[a, b], [b, c], [c, a]] {
-            normals.entry([m.min(n), m.max(n)]).or_default().push(normal);
+        for edge in triangle_edges(facet.nodes) {
+            normals.entry(edge).or_default().push(normal);
         }
     }
     let is_sharp = |normals: &[Point]| match normals {

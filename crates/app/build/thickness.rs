@@ -16,8 +16,7 @@ pub(super) fn cut_warning(config: &Config, shape: Option<&Shape>, full_mesh: &Me
     let constraint = config.constraints.iter().find(is_on_thickness)?;
     // In it a region that its surface replaces ends where the device does.
     let topology = full_mesh.topology();
-    let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
-    let outer: HashSet<_> = outer.map(|facet| face_key(facet.nodes)).collect();
+    let outer: HashSet<_> = topology.outer_facets().map(|facet| face_key(facet.nodes)).collect();
     let opposite: Vec<_> = shape?.thickness()?.opposite_faces().map(face_key).collect();
     let cut: Vec<_> = opposite.iter().filter(|face| outer.contains(*face)).collect();
     if cut.is_empty() {

@@ -202,15 +202,20 @@ impl Truncation {
         named(&self.surface, self.at_m, mark)
     }
 
-    /// What no error bar counts, where walls send flux back, however far they are, or are near.
-    pub(crate) fn described(&self) -> Option<String> {
-        let confined = self.confined.as_ref().map(|[first, second]| {
+    /// What no error bar counts, where walls send flux back, however far they are.
+    pub(crate) fn sent_back(&self) -> Option<String> {
+        self.confined.as_ref().map(|[first, second]| {
             format!(
                 "between the planes {first} and {second}, which flux passes, the sides are flux-parallel all round: they send back \
                  beside the device all that passes it, however far they are, and no error bar counts that. Where the device goes on \
-                 alike beyond both planes with open space around it, as a long coil does, leave the far sides without a condition"
+                 alike beyond both planes with open space around it, as a long coil or a ring does, leave the far sides without a \
+                 condition"
             )
-        });
+        })
+    }
+
+    /// The same, and where walls are near.
+    pub(crate) fn described(&self) -> Option<String> {
         let Self { distance_m, source_size_m, near, .. } = self;
         let ratio = distance_m / source_size_m;
         let near = (ratio < *near).then(|| {
@@ -221,7 +226,7 @@ impl Truncation {
                 Millimetres(*distance_m)
             )
         });
-        confined.into_iter().chain(near).reduce(|first, second| format!("{first}; {second}"))
+        self.sent_back().into_iter().chain(near).reduce(|first, second| format!("{first}; {second}"))
     }
 }
 

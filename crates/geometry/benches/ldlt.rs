@@ -2,7 +2,7 @@
 //! `-- CELLS …` over others.
 //!
 //! Three decoupled Laplacians with a complex mass on a block of cubes of six tetrahedra, as the vector potential has where
-//! no material changes; against faer's Cholesky of the real part. Every case runs in a process of its own, because the
+//! no material changes. Every case runs in a process of its own, because the
 //! largest memory of a process never falls again. Memory is what Linux counts (`VmHWM`) from before the factorisation on,
 //! in parts of the factor.
 
@@ -11,17 +11,16 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
-use fluxmorph_geometry::fem::csr::{CsrMatrix, CsrStructure};
+use fluxmorph_geometry::fem::csr::CsrStructure;
 use fluxmorph_geometry::fem::{
-    BlockPattern, Cholesky, CholeskyAnalysis, Coupling, DofMap, ElementGroup, FactorScalar, Ldlt,
-    LdltAnalysis, ordering,
+    BlockPattern, Coupling, DofMap, ElementGroup, FactorScalar, Ldlt, LdltAnalysis, ordering,
 };
 use fluxmorph_geometry::generate::{BlockParameters, block};
 use num_complex::{Complex32, Complex64};
 
 /// Cells along each edge of the blocks: 41k, 98k and 192k unknowns.
 const CELLS: [usize; 3] = [23, 31, 39];
-const KINDS: [&str; 5] = ["llt64", "f64", "f32", "c64", "c32"];
+const KINDS: [&str; 4] = ["f64", "f32", "c64", "c32"];
 
 /// A memory figure of this process [bytes].
 fn memory(key: &str) -> usize {
@@ -59,66 +58,38 @@ fn value(structure: &CsrStructure, row: usize, k: usize) -> Complex64 {
 }
 
 /// Factors twice, solves five times; prints the least processor and wall times [s], the peak and the bytes of the factor.
-fn measure<T: FactorScalar, F>(
-    n: usize,
-    entries: usize,
-    factor: impl Fn() -> F,
-    solve: impl Fn(&F, &mut [T]),
-    bytes: impl Fn(&F) -> usize,
-) {
+fn measure<T: FactorScalar>(analysis: &Arc<LdltAnalysis>, entry: impl Fn(usize, usize) -> T + Sync) {
+    let factor = || Ldlt::new(analysis, &entry).expect("no pivot is zero");
     let before = memory("VmRSS:");
     forget_peak();
-    let (made, mut cpu, mut wall) = timed(&factor);
-    let (peak, bytes) = (memory("VmHWM:").saturating_sub(before), bytes(&made));
+    let (made, mut cpu, mut wall) = timed(factor);
+    let (peak, bytes) = (memory("VmHWM:").saturating_sub(before), made.bytes());
     drop(made);
-    let (made, again_cpu, again_wall) = timed(&factor);
+    let (made, again_cpu, again_wall) = timed(factor);
     (cpu, wall) = (cpu.min(again_cpu), wall.min(again_wall));
     let (mut solve_cpu, mut solve_wall) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..5 {
-        let mut x = vec![T::ONE; n];
-        let ((), this_cpu, this_wall) = timed(|| solve(&made, &mut x));
+        let mut x = vec![T::ONE; analysis.size()];
+        let ((), this_cpu, this_wall) = timed(|| made.solve_in_place(&mut x));
         (solve_cpu, solve_wall) = (solve_cpu.min(this_cpu), solve_wall.min(this_wall));
     }
+    let (n, entries) = (analysis.size(), analysis.factor_entries());
     println!("{n} {entries} {cpu} {wall} {solve_cpu} {solve_wall} {peak} {bytes}");
-}
-
-fn measure_ldlt<T: FactorScalar>(analysis: &Arc<LdltAnalysis>, entry: impl Fn(usize, usize) -> T + Sync) {
-    measure(
-        analysis.size(),
-        analysis.factor_entries(),
-        || Ldlt::new(analysis, &entry).expect("no pivot is zero"),
-        |factor: &Ldlt<T>, x| factor.solve_in_place(x),
-        Ldlt::bytes,
-    );
 }
 
 fn child(cells: usize, kind: &str) {
     let (dofs, structure) = system(cells);
     let s = &structure;
-    if kind == "llt64" {
-        let (analysis, cpu, _) = timed(|| CholeskyAnalysis::new(s).expect("a pattern"));
-        let values = (0..s.row_count()).flat_map(|row| s.row(row).map(move |k| value(s, row, k).re));
-        let matrix = CsrMatrix { structure: Arc::clone(s), values: values.collect() };
-        print!("{cpu} ");
-        let entries = analysis.factor_entries();
-        return measure(
-            s.row_count(),
-            entries,
-            || Cholesky::new(&analysis, &matrix).expect("positive definite"),
-            |factor: &Cholesky<f64>, x| factor.solve_in_place(x),
-            |_| entries * size_of::<f64>(),
-        );
-    }
     let (analysis, cpu, _) = timed(|| {
         let order = ordering::nested_dissection_of_nodes(s, &dofs);
         LdltAnalysis::new(s, order).expect("a pattern")
     });
     print!("{cpu} ");
     match kind {
-        "f64" => measure_ldlt(&analysis, |row, k| value(s, row, k).re),
-        "f32" => measure_ldlt(&analysis, |row, k| value(s, row, k).re as f32),
-        "c64" => measure_ldlt(&analysis, |row, k| value(s, row, k)),
-        _ => measure_ldlt(&analysis, |row, k| {
+        "f64" => measure(&analysis, |row, k| value(s, row, k).re),
+        "f32" => measure(&analysis, |row, k| value(s, row, k).re as f32),
+        "c64" => measure(&analysis, |row, k| value(s, row, k)),
+        _ => measure(&analysis, |row, k| {
             let z = value(s, row, k);
             Complex32::new(z.re as f32, z.im as f32)
         }),

@@ -140,7 +140,7 @@ impl<'a> CurvedSurfaces<'a> {
     fn images(&self, topology: &Topology, joined: &BTreeSet<Side>) -> Vec<(Side, Point)> {
         let mut outer: BTreeMap<[NodeId; 2], Vec<([NodeId; 3], Point)>> = BTreeMap::new();
         let is_on_surface = |edge: &[NodeId; 2]| edge.iter().all(|n| self.around.contains_key(n));
-        for facet in topology.facets().iter().filter(|facet| facet.outside.is_none()) {
+        for facet in topology.outer_facets() {
             let area = area_vector(facet.nodes.map(|n| self.points[n.index()]));
             for edge in
                 triangle_edges(facet.nodes).into_iter().filter(|edge| norm(area) > 0.0 && is_on_surface(edge))

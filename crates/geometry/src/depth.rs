@@ -1,4 +1,4 @@
-//! How far places lie from a surface of triangles.
+//! How far places lie from a surface of triangles, and where on it they are nearest.
 
 use rayon::prelude::*;
 
@@ -18,48 +18,52 @@ pub fn depths(mesh: &Mesh, triangles: &[[NodeId; 3]], points: &[Point], far: f64
             return square.sqrt();
         }
         // No triangle whose box is farther than this one can be nearer.
-        let bound = distance(point, &corners[first]);
+        let bound = nearest_on_triangle(point, &corners[first]).1;
         let mut least = bound;
         let reach = bound * bound;
         tree.for_each(
             |around| around.square_distance(point) <= reach,
-            |i| least = least.min(distance(point, &corners[i])),
+            |i| least = least.min(nearest_on_triangle(point, &corners[i]).1),
         );
         least
     };
     points.par_iter().map(depth).collect()
 }
 
-/// Distance of a point from a triangle [m] (C. Ericson, Real-Time Collision Detection, 2005, section 5.1.5).
-pub fn distance(point: Point, &[a, b, c]: &[Point; 3]) -> f64 {
-    let to = |foot: Point| norm(sub(point, foot));
+/// The point of a triangle that lies nearest to a place, by the weights of its corners [1], and its distance [m] (C. Ericson,
+/// Real-Time Collision Detection, 2005, section 5.1.5). Corners may coincide: `[a, b, b]` is an edge.
+pub fn nearest_on_triangle(place: Point, &[a, b, c]: &[Point; 3]) -> ([f64; 3], f64) {
+    let at = |weights: [f64; 3], foot: Point| (weights, norm(sub(place, foot)));
     let along = |from: Point, edge: Point, share: f64| add(from, edge.map(|e| share * e));
     let (ab, ac) = (sub(b, a), sub(c, a));
     let [(d1, d2), (d3, d4), (d5, d6)] = [a, b, c].map(|corner| {
-        let own = sub(point, corner);
+        let own = sub(place, corner);
         (dot(ab, own), dot(ac, own))
     });
     if d1 <= 0.0 && d2 <= 0.0 {
-        return to(a);
+        return at([1.0, 0.0, 0.0], a);
     }
     if d3 >= 0.0 && d4 <= d3 {
-        return to(b);
+        return at([0.0, 1.0, 0.0], b);
     }
     if d6 >= 0.0 && d5 <= d6 {
-        return to(c);
+        return at([0.0, 0.0, 1.0], c);
     }
     let (va, vb, vc) = (d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2);
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return to(along(a, ab, d1 / (d1 - d3)));
+        let share = d1 / (d1 - d3);
+        return at([1.0 - share, share, 0.0], along(a, ab, share));
     }
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return to(along(a, ac, d2 / (d2 - d6)));
+        let share = d2 / (d2 - d6);
+        return at([1.0 - share, 0.0, share], along(a, ac, share));
     }
     if va <= 0.0 && d4 >= d3 && d5 >= d6 {
-        return to(along(b, sub(c, b), (d4 - d3) / ((d4 - d3) + (d5 - d6))));
+        let share = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        return at([0.0, 1.0 - share, share], along(b, sub(c, b), share));
     }
     let sum = va + vb + vc;
-    to(add(along(a, ab, vb / sum), ac.map(|e| vc / sum * e)))
+    at([va / sum, vb / sum, vc / sum], add(along(a, ab, vb / sum), ac.map(|e| vc / sum * e)))
 }
 
 #[cfg(test)]
@@ -75,11 +79,13 @@ mod tests {
             let point = [1.7 * (0.7 * t).sin(), 1.5 * (1.1 * t).cos(), 1.2 * (0.3 * t + 1.0).sin()];
             let samples =
                 (0..=60).flat_map(|i| (0..=60 - i).map(move |j| (i as f64 / 60.0, j as f64 / 60.0)));
-            let place = |(u, v): (f64, f64)| -> Point {
-                std::array::from_fn(|d| (1.0 - u - v) * corners[0][d] + u * corners[1][d] + v * corners[2][d])
+            let place = |weights: [f64; 3]| -> Point {
+                std::array::from_fn(|d| (0..3).map(|k| weights[k] * corners[k][d]).sum())
             };
-            let least = samples.map(|s| norm(sub(point, place(s)))).fold(f64::INFINITY, f64::min);
-            let found = distance(point, &corners);
+            let to = |weights| norm(sub(point, place(weights)));
+            let least = samples.map(|(u, v)| to([1.0 - u - v, u, v])).fold(f64::INFINITY, f64::min);
+            let (weights, found) = nearest_on_triangle(point, &corners);
+            assert!((to(weights) - found).abs() < 1e-12 && weights.iter().all(|&w| w >= 0.0), "{weights:?}");
             // Samples lie within 1/60 of the longest side of 1.3 m of any place in the triangle.
             assert!(found <= least + 1e-12 && least <= found + 1.3 / 60.0, "{point:?}: {found} {least}");
         }

@@ -31,11 +31,16 @@ pub fn triangle_edges([a, b, c]: [NodeId; 3]) -> [[NodeId; 2]; 3] {
 
 /// The edges that only one of some triangles has.
 pub fn rim_edges(triangles: &[[NodeId; 3]]) -> BTreeSet<[NodeId; 2]> {
-    let mut count: BTreeMap<[NodeId; 2], usize> = BTreeMap::new();
-    for edge in triangles.iter().flat_map(|t| triangle_edges(*t)) {
-        *count.entry(edge).or_default() += 1;
+    around_edges(triangles).into_iter().filter(|(_, at)| at.len() == 1).map(|(edge, _)| edge).collect()
+}
+
+/// The triangles at every edge, by their numbers, ascending.
+pub fn around_edges(triangles: &[[NodeId; 3]]) -> BTreeMap<[NodeId; 2], Vec<usize>> {
+    let mut around: BTreeMap<[NodeId; 2], Vec<usize>> = BTreeMap::new();
+    for (t, triangle) in triangles.iter().enumerate() {
+        triangle_edges(*triangle).into_iter().for_each(|edge| around.entry(edge).or_default().push(t));
     }
-    count.into_iter().filter(|&(_, n)| n == 1).map(|(edge, _)| edge).collect()
+    around
 }
 
 /// Whether two orders of the same three nodes have the same normal.
@@ -252,6 +257,11 @@ impl Topology {
         &self.facets
     }
 
+    /// Faces at the outside of the mesh, in the order of [`Topology::facets`].
+    pub fn outer_facets(&self) -> impl Iterator<Item = &Facet> + Clone {
+        self.facets.iter().filter(|facet| facet.outside.is_none())
+    }
+
     /// Faces between two regions, oriented out of the first, in the order of [`Topology::facets`].
     pub fn interface(&self, of: RegionId, towards: RegionId) -> Vec<[NodeId; 3]> {
         let region_at = |e: ElementId| self.region_of[e.index()];
@@ -268,8 +278,7 @@ impl Topology {
 
     /// Faces of a region at the outside of the mesh, oriented outwards.
     pub fn outer_faces(&self, of: RegionId) -> Vec<[NodeId; 3]> {
-        let outer = |f: &&Facet| f.outside.is_none() && self.region_of[f.inside.index()] == of;
-        self.facets.iter().filter(outer).map(|f| f.nodes).collect()
+        self.outer_facets().filter(|f| self.region_of[f.inside.index()] == of).map(|f| f.nodes).collect()
     }
 
     /// All faces of a region, oriented outwards, in the order of [`Topology::facets`].

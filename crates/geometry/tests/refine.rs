@@ -52,8 +52,7 @@ fn assert_sound(coarse: &Mesh, refinement: &Refinement) {
     let fine = refinement.mesh();
     let (old, new) = (coarse.topology(), fine.topology());
     let outer = |mesh: &Mesh| {
-        let faces = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-        total_area(mesh, &faces.map(|facet| facet.nodes).collect::<Vec<_>>()).1
+        total_area(mesh, &mesh.topology().outer_facets().map(|facet| facet.nodes).collect::<Vec<_>>()).1
     };
     assert_close(outer(fine), outer(coarse), "the outside");
     for name in old.region_names() {

@@ -59,7 +59,7 @@ fn surfaces_have_their_areas_and_point_outwards() {
             assert!((found[d] - vector[d]).abs() < 1e-12, "{name}: {found:?}");
         }
     }
-    let outside = mesh.topology().facets().iter().filter(|f| f.outside.is_none()).count();
+    let outside = mesh.topology().outer_facets().count();
     let named: usize = ["x_min", "x_max", "y_min", "y_max", "z_min", "z_max"]
         .iter()
         .map(|name| mesh.topology().surface(name).expect("a grid has it").len())

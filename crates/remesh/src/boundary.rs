@@ -105,7 +105,6 @@ impl NodeConditions {
         let topology = mesh.topology();
         let node_count = topology.node_count();
         check_nodes("the list of design nodes", &setup.design_nodes, node_count)?;
-        check_nodes("the list of fixed nodes", &setup.fixed_nodes, node_count)?;
         let faces = sorted_faces(topology, elements);
         let mut is_design = vec![false; node_count];
         setup.design_nodes.iter().for_each(|n| is_design[n.index()] = true);
@@ -148,7 +147,6 @@ impl NodeConditions {
         for (held, _) in held.iter_mut().zip(&touched_outside).filter(|(_, outside)| **outside) {
             *held = ALL;
         }
-        setup.fixed_nodes.iter().for_each(|n| held[n.index()] = ALL);
 
         let (is_design, frames) = (vec![false; node_count], BTreeMap::new());
         let mut conditions = Self { design_nodes: Vec::new(), is_design, held, frames };

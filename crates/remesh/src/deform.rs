@@ -76,8 +76,6 @@ pub struct RemeshSetup {
     pub design_nodes: Vec<NodeId>,
     /// Surfaces with a kind; nodes of [`crate::BoundaryKind::Design`] surfaces follow the listed design nodes, ascending.
     pub boundaries: Vec<Boundary>,
-    /// Further nodes that do not move.
-    pub fixed_nodes: Vec<NodeId>,
     /// How the elastic system is solved in one process.
     pub solver: SolverChoice,
     /// The ranks over which it is distributed; `None` for one process.

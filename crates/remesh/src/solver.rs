@@ -13,8 +13,8 @@ use std::sync::Arc;
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::{
-    Cholesky, CholeskyAnalysis, ComponentAnalysis, ComponentPreconditioner, CsrMatrix, DofMap,
-    IterationStatus, conjugate_gradients, csr::CsrStructure,
+    ComponentAnalysis, ComponentPreconditioner, CsrMatrix, DofMap, IterationStatus, Ldlt, LdltAnalysis,
+    conjugate_gradients, csr::CsrStructure, ordering,
 };
 
 use crate::distributed::DistributedElastic;
@@ -40,9 +40,9 @@ pub enum SolverChoice {
     /// By its size: direct for small systems, component blocks for large ones.
     #[default]
     Automatic,
-    /// One Cholesky factor of the whole matrix.
+    /// One factor of the whole matrix.
     Direct,
-    /// Conjugate gradients, preconditioned by the Cholesky factors of `K_xx`, `K_yy` and `K_zz`.
+    /// Conjugate gradients, preconditioned by the factors of `K_xx`, `K_yy` and `K_zz`.
     ComponentBlocks,
 }
 
@@ -51,7 +51,7 @@ pub enum SolverChoice {
 pub(crate) enum SolverAnalysis {
     /// There is no unknown.
     Nothing,
-    Direct(Arc<CholeskyAnalysis>),
+    Direct(Arc<LdltAnalysis>),
     ComponentBlocks(Arc<ComponentAnalysis>),
     /// Rows and factors are distributed over ranks.
     Distributed(Arc<DistributedElastic>),
@@ -61,7 +61,7 @@ pub(crate) enum SolverAnalysis {
 #[derive(Debug)]
 pub(crate) enum ElasticSolver {
     Nothing,
-    Direct(Cholesky),
+    Direct(Ldlt<f64>),
     ComponentBlocks { matrix: CsrMatrix<f64>, preconditioner: ComponentPreconditioner },
     Distributed(DistributedSlot),
 }
@@ -100,7 +100,8 @@ impl SolverAnalysis {
             SolverChoice::ComponentBlocks => false,
         };
         Ok(if direct {
-            Self::Direct(CholeskyAnalysis::of_nodes(structure, unknowns)?)
+            let order = ordering::nested_dissection_of_nodes(structure, unknowns);
+            Self::Direct(LdltAnalysis::new(structure, order)?)
         } else {
             Self::ComponentBlocks(ComponentAnalysis::new(unknowns, structure)?)
         })
@@ -140,7 +141,9 @@ impl ElasticSolver {
     pub(crate) fn of_matrix(analysis: &SolverAnalysis, matrix: CsrMatrix<f64>) -> Result<Self, RemeshError> {
         Ok(match analysis {
             SolverAnalysis::Nothing => Self::Nothing,
-            SolverAnalysis::Direct(analysis) => Self::Direct(Cholesky::new(analysis, &matrix)?),
+            SolverAnalysis::Direct(analysis) => {
+                Self::Direct(Ldlt::positive_definite(analysis, |_, k| matrix.values[k])?)
+            }
             SolverAnalysis::ComponentBlocks(analysis) => {
                 let preconditioner = ComponentPreconditioner::new(analysis, &matrix)?;
                 Self::ComponentBlocks { matrix, preconditioner }

@@ -14,13 +14,12 @@ fn mesh() -> Mesh {
     shaken(&unit_cells([5, 4, 4]), 0.1)
 }
 
-/// The top designed, the bottom held, the sides free to follow.
+/// The top designed, all other outer faces held.
 fn setup(mesh: &Mesh, solver: SolverChoice, subregions: Vec<Subregion>) -> RemeshSetup {
     RemeshSetup {
         subregions,
         policy: StiffnessPolicy::Uniform,
         design_nodes: nodes_where(mesh, |p| p[2] == 4.0),
-        fixed_nodes: nodes_where(mesh, |p| p[2] == 0.0),
         solver,
         ..RemeshSetup::default()
     }

@@ -222,7 +222,7 @@ mod tests {
     fn fields_of(mesh: &Mesh, n: usize, outside_is_fixed: bool) -> (Space, Vec<HarmonicField>) {
         let space = Space::new(mesh.topology(), ElementFamily::Edge, Order::Linear);
         let mut fixed = HashSet::new();
-        for facet in mesh.topology().facets().iter().filter(|facet| facet.outside.is_none()) {
+        for facet in mesh.topology().outer_facets() {
             let points = facet.nodes.map(|v| mesh.point(v));
             let on_side = |d: usize| [0.0, n as f64].iter().any(|c| points.iter().all(|x| x[d] == *c));
             if outside_is_fixed && (0..3).any(on_side) {

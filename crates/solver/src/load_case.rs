@@ -3,7 +3,6 @@
 //! Load cases of one frequency differ in their right sides alone: where all materials are linear they share matrix, factor and
 //! responses, and a further case costs one solution. Permanent magnets and applied fields are those of the set-up in all of them.
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 use std::sync::Arc;
 
@@ -82,14 +81,6 @@ impl FieldModel {
     pub fn label(&self) -> String {
         let name = self.setup().load_case.clone();
         name.unwrap_or_else(|| frequency_label(self.setup().frequency)).replace(['-', '.'], "_")
-    }
-
-    /// The same problem at another frequency [Hz].
-    ///
-    /// # Errors
-    /// As [`FieldModel::new`].
-    pub fn at_frequency(&self, mesh: &Mesh, frequency: f64) -> Result<Self, SolverError> {
-        self.at_load_case(mesh, &LoadCase { frequency, ..self.load_case() })
     }
 
     /// Whether the matrix is that of another problem on every mesh, so that a system of one serves both.

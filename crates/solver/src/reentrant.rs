@@ -6,11 +6,11 @@
 //! patches that end at such an edge; on all others it is zero, which leaves no gradient undetermined in a cavity. A
 //! surface that ends at a natural face (flux-normal) goes on in its mirror image: there the angle counts twice.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::HashSet;
 
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
 use fluxmorph_geometry::tet4::{area_vector, dot, norm, sub};
-use fluxmorph_geometry::topology::{face_key, triangle_edges};
+use fluxmorph_geometry::topology::{around_edges, face_key};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use crate::fixed_directions::CREASE;
@@ -24,8 +24,7 @@ pub(crate) fn beside_reentrant_edges(
     faces: &HashSet<[NodeId; 3]>,
     applied: &HashSet<[NodeId; 3]>,
 ) -> Vec<[NodeId; 3]> {
-    let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-    let triangles: Vec<[NodeId; 3]> = outer.map(|facet| facet.nodes).collect();
+    let triangles: Vec<[NodeId; 3]> = mesh.topology().outer_facets().map(|facet| facet.nodes).collect();
     let is_listed: Vec<bool> = triangles.iter().map(|t| faces.contains(&face_key(*t))).collect();
     let around = around_edges(&triangles);
     let mut patches = DisjointSets::new(triangles.len());
@@ -50,15 +49,6 @@ pub(crate) fn beside_reentrant_edges(
     let found: HashSet<usize> = beside.into_iter().map(|t| patches.root(t)).collect();
     let is_beside = |t: &usize| is_listed[*t] && found.contains(&patches.root(*t));
     (0..triangles.len()).filter(is_beside).map(|t| triangles[t]).collect()
-}
-
-/// The triangles at every edge, by their numbers.
-pub(crate) fn around_edges(triangles: &[[NodeId; 3]]) -> BTreeMap<[NodeId; 2], Vec<usize>> {
-    let mut around: BTreeMap<[NodeId; 2], Vec<usize>> = BTreeMap::new();
-    for (t, triangle) in triangles.iter().enumerate() {
-        triangle_edges(*triangle).into_iter().for_each(|edge| around.entry(edge).or_default().push(t));
-    }
-    around
 }
 
 /// The pairs of outer faces at an edge with a part of the mesh between them: one, or more where parts touch at the edge.
@@ -153,8 +143,7 @@ mod tests {
             grid.topology(&["air", "hole"], |x| RegionId(u32::from(hole(x)))).expect("two regions");
         let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
         let (mesh, exposed) = mesh.without_region(RegionId(1)).expect("what is left");
-        let outside = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-        let all: HashSet<_> = outside.map(|facet| face_key(facet.nodes)).collect();
+        let all: HashSet<_> = mesh.topology().outer_facets().map(|facet| face_key(facet.nodes)).collect();
         let keys =
             |triangles: &[[NodeId; 3]]| -> HashSet<_> { triangles.iter().map(|t| face_key(*t)).collect() };
         assert_eq!(keys(&beside_reentrant_edges(&mesh, &all, &HashSet::new())), keys(&exposed));
@@ -190,7 +179,7 @@ mod tests {
         let topology = Topology::new(points.len(), tets, vec!["air".to_owned()], vec![RegionId(0); 5]);
         let mesh = Mesh::new(Arc::new(topology.expect("a fan")), points).expect("a mesh");
         let of_edge = |t: &[NodeId; 3]| t.contains(&NodeId(0)) && t.contains(&NodeId(1));
-        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+        let outer = mesh.topology().outer_facets();
         let all: HashSet<_> = outer.map(|facet| face_key(facet.nodes)).filter(of_edge).collect();
         let every: HashSet<_> = mesh.topology().facets().iter().map(|facet| face_key(facet.nodes)).collect();
         let others = every.difference(&all).copied().collect();

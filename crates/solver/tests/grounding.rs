@@ -95,7 +95,7 @@ fn the_surface_of_a_conductor_with_edges_has_a_potential_and_one_ground() {
 #[test]
 fn the_inner_surface_of_a_box_has_no_potential() {
     let inner = |mesh: &Mesh, hole: Vec<[NodeId; 3]>| -> Vec<[NodeId; 3]> {
-        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+        let outer = mesh.topology().outer_facets();
         let is_hole = |face: [NodeId; 3]| hole.iter().any(|&other| face_key(other) == face_key(face));
         outer.map(|facet| facet.nodes).filter(|&nodes| !is_hole(nodes)).collect()
     };

@@ -155,7 +155,7 @@ fn a_cavity_in_an_impedance_has_one_field() {
         .flat_map(|name| topology.surface(name).expect("a side"))
         .map(|&triangle| face_key(triangle))
         .collect();
-    let outer = topology.facets().iter().filter(|facet| facet.outside.is_none()).map(|facet| facet.nodes);
+    let outer = topology.outer_facets().map(|facet| facet.nodes);
     let surface: Vec<_> = outer.filter(|&nodes| !planes.contains(&face_key(nodes))).collect();
     let material = Material { relative_permeability: 1.0, conductivity: 1e8 };
     let frequency = 25.330_295_91;

@@ -94,7 +94,7 @@ fn outer_faces(
     let taken: HashSet<[NodeId; 3]> =
         conductors.iter().flat_map(|c| &c.surface).map(|&t| face_key(t)).collect();
     let mut faces = [("bottom", Vec::new()), ("top", Vec::new()), ("walls", Vec::new())];
-    for facet in mesh.topology().facets().iter().filter(|f| f.outside.is_none()) {
+    for facet in mesh.topology().outer_facets() {
         if taken.contains(&face_key(facet.nodes)) {
             continue;
         }

@@ -10,7 +10,8 @@ use fluxmorph_solver::{Boundary, FieldModel, SurfaceLaw};
 
 use super::{Side, Standing};
 
-/// Two planes opposite each other that coils or matter reach and flux passes, where no flux passes what joins them.
+/// Two planes that coils or matter reach and flux passes, where no flux passes what joins them: those at the ends of a slice, or of a
+/// sector that leaves out its axis. Planes that meet have an edge along which nothing holds `A`.
 pub(super) fn confined<'s>(sides: &'s [Side], model: &FieldModel, mesh: &Mesh) -> Option<[&'s Side; 2]> {
     let held = held_edges(model, mesh);
     let is_closed = |side: &&Side| {
@@ -20,7 +21,8 @@ pub(super) fn confined<'s>(sides: &'s [Side], model: &FieldModel, mesh: &Mesh) -
         is_plane && rim_edges(&side.triangles).iter().all(|edge| held.contains(edge)) && is_free()
     };
     let closed: Vec<&Side> = sides.iter().filter(is_closed).collect();
-    closed.iter().find_map(|side| Some([*side, *closed.iter().find(|other| side.is_opposite(other))?]))
+    let [first, second, ..] = closed[..] else { return None };
+    Some([first, second])
 }
 
 /// Edges along which `A` is zero.

@@ -226,6 +226,8 @@ pub(super) fn summary<'a>(
     let reference = problem.original().topology();
     let mut warnings = advice(config, &setup);
     warnings.splice(0..0, setup.warnings.iter().cloned());
+    let truncation = Truncation::of(config, &setup);
+    warnings.extend(truncation.as_ref().and_then(Truncation::sent_back));
     Ok(Summary {
         title: &config.title,
         mesh_origin: config.mesh.generator().map_or("file", Generator::name),
@@ -255,7 +257,7 @@ pub(super) fn summary<'a>(
         coils: &config.coils,
         boundaries: &config.boundaries,
         open: config.open.as_ref(),
-        truncation: Truncation::of(config, &setup),
+        truncation,
         objective: config.objective.as_ref(),
         objective_unit: config.objective.as_ref().and_then(Objective::si_unit),
         constraints: &config.constraints,

@@ -1,5 +1,5 @@
 //! The block-diagonal preconditioner of large symmetric positive definite systems with several components a node: the
-//! Cholesky factors of the diagonal blocks `K_cc` of the components. The iteration is in
+//! factors of the diagonal blocks `K_cc` of the components. The iteration is in
 //! [`crate::fem::conjugate_gradients`].
 //!
 //! Where the components are of the same kind (displacements of one body), Korn's inequality makes the block diagonal
@@ -18,9 +18,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::error::MeshError;
-use crate::fem::cholesky::{Cholesky, CholeskyAnalysis};
 use crate::fem::csr::{CsrMatrix, CsrStructure};
 use crate::fem::dofs::DofMap;
+use crate::fem::ldlt::{Ldlt, LdltAnalysis};
 use crate::fem::ordering;
 use crate::ids::CarrierId;
 
@@ -30,7 +30,7 @@ struct Block {
     /// Its equations in the whole system, ascending.
     equations: Vec<u32>,
     structure: Arc<CsrStructure>,
-    analysis: Arc<CholeskyAnalysis>,
+    analysis: Arc<LdltAnalysis>,
 }
 
 /// The splitting of a system into component blocks, from the pattern alone.
@@ -79,10 +79,9 @@ impl ComponentAnalysis {
                     let own = Arc::new(own);
                     let restricted = order.as_ref().map(|nodes| {
                         let own_equations = nodes.iter().filter_map(|&node| dofs.equation(node, c));
-                        let forward = own_equations.map(|equation| local[equation]).collect();
-                        ordering::postorder(&own, forward)
+                        own_equations.map(|equation| local[equation]).collect()
                     });
-                    let analysis = CholeskyAnalysis::with_order(&own, restricted)?;
+                    let analysis = LdltAnalysis::new(&own, restricted)?;
                     (own, analysis)
                 }
             };
@@ -132,11 +131,11 @@ impl ComponentAnalysis {
 /// A factor in the precision that it takes.
 #[derive(Debug)]
 enum Factor {
-    Single(Cholesky<f32>),
-    Double(Cholesky<f64>),
+    Single(Ldlt<f32>),
+    Double(Ldlt<f64>),
 }
 
-/// The factor of one group of blocks, `D A D = L Lᵀ` with unit diagonal.
+/// The factor of one group of blocks, of `D A D` with unit diagonal.
 #[derive(Debug)]
 struct GroupFactor {
     /// Equations of each member in the whole system.
@@ -185,7 +184,7 @@ impl ComponentPreconditioner {
 
 impl GroupFactor {
     fn new(
-        analysis: &Arc<CholeskyAnalysis>,
+        analysis: &Arc<LdltAnalysis>,
         mut block: CsrMatrix<f64>,
         members: Vec<usize>,
     ) -> Result<Self, MeshError> {
@@ -200,10 +199,9 @@ impl GroupFactor {
                 block.values[k] *= scale[row] * scale[structure.columns[k] as usize];
             }
         }
-        let single = CsrMatrix { structure, values: block.values.iter().map(|&v| v as f32).collect() };
-        let factor = match Cholesky::new(analysis, &single) {
+        let factor = match Ldlt::positive_definite(analysis, |_, k| block.values[k] as f32) {
             Ok(factor) => Factor::Single(factor),
-            Err(_) => Factor::Double(Cholesky::new(analysis, &block)?),
+            Err(_) => Factor::Double(Ldlt::positive_definite(analysis, |_, k| block.values[k])?),
         };
         Ok(Self { members, scale, factor })
     }

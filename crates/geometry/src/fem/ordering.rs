@@ -13,13 +13,7 @@ use crate::fem::csr::CsrStructure;
 use crate::fem::dofs::DofMap;
 use crate::ids::CarrierId;
 
-/// Nested dissection, postordered; a permutation, `forward[new] = old`.
-pub fn nested_dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
-    let dissection = dissection(structure)?;
-    Some(postorder(structure, dissection))
-}
-
-/// METIS's nested dissection; `None` where METIS refuses (empty graph, too large for its indices).
+/// METIS's nested dissection; a permutation, `forward[new] = old`; `None` where METIS refuses (empty graph, too large for its indices).
 pub fn dissection(structure: &CsrStructure) -> Option<Vec<u32>> {
     metis::nested_dissection(&structure.row_starts, &structure.columns, None)
 }
@@ -119,7 +113,7 @@ pub(super) fn upper_triangle(
 }
 
 /// An ordering with the same fill whose elimination tree is postordered.
-pub fn postorder(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
+pub(super) fn postorder(structure: &CsrStructure, forward: Vec<u32>) -> Vec<u32> {
     let n = forward.len();
     let inverse = inverse_permutation(&forward);
     let (starts, rows) = upper_triangle(structure, &forward, &inverse);
@@ -149,8 +143,8 @@ mod tests {
         let n = 200;
         let row = |i| [(i + n - 1) % n, i, (i + 1) % n].map(|c| (c, 0.0)).to_vec();
         let structure = CsrMatrix::from_rows(n, (0..n).map(row)).structure;
-        let mut order = nested_dissection(&structure).expect("METIS orders a ring");
-        assert_eq!(order, nested_dissection(&structure).expect("METIS orders a ring"), "repeatable");
+        let mut order = dissection(&structure).expect("METIS orders a ring");
+        assert_eq!(order, dissection(&structure).expect("METIS orders a ring"), "repeatable");
         order.sort_unstable();
         assert!(order.into_iter().eq(0..200));
     }

@@ -197,12 +197,8 @@ impl Grid {
         let mut topology = Topology::new(nodes, tets, names, region_of)?;
         for (name, axis, upper) in OUTER_FACES {
             let line = if upper { self.cells()[axis] } else { 0 };
-            let triangles = topology
-                .facets()
-                .iter()
-                .filter(|f| f.outside.is_none() && self.on_line(f.nodes, axis, line))
-                .map(|f| f.nodes)
-                .collect();
+            let outer = topology.outer_facets().map(|facet| facet.nodes);
+            let triangles = outer.filter(|nodes| self.on_line(*nodes, axis, line)).collect();
             topology = topology.with_surface(name, triangles)?;
         }
         Ok(topology)

@@ -98,7 +98,7 @@ fn covered_faces(
 ) -> Result<BTreeMap<[NodeId; 3], Facet>, MeshError> {
     let topology = mesh.topology();
     let outer: BTreeMap<[NodeId; 3], Facet> =
-        topology.facets().iter().filter(|f| f.outside.is_none()).map(|f| (face_key(f.nodes), *f)).collect();
+        topology.outer_facets().map(|f| (face_key(f.nodes), *f)).collect();
     let mut faces = BTreeMap::new();
     for name in &parameters.surfaces {
         for &triangle in topology.surface(name)? {
@@ -149,8 +149,7 @@ fn sides(
             ends.insert(edge);
         }
     }
-    let beside =
-        topology.facets().iter().filter(|f| f.outside.is_none() && !faces.contains_key(&face_key(f.nodes)));
+    let beside = topology.outer_facets().filter(|f| !faces.contains_key(&face_key(f.nodes)));
     let mut edges_of: BTreeMap<[NodeId; 3], Vec<[NodeId; 2]>> = BTreeMap::new();
     for facet in beside {
         for edge in edges(facet.nodes).into_iter().filter(|edge| ends.contains(edge)) {
@@ -276,7 +275,7 @@ mod tests {
         assert!((area(&mesh, "x_min") / area(&inside, "x_min") - 4.0).abs() < 1e-12);
         let outside: f64 = names.iter().map(|name| area(&inside, name)).sum();
         assert!((area(&mesh, "infinity") / outside - 4.0).abs() < 1e-12);
-        let all = mesh.topology().facets().iter().filter(|f| f.outside.is_none()).count();
+        let all = mesh.topology().outer_facets().count();
         let named = ["x_min", "infinity"].map(|name| mesh.topology().surface(name).expect("named").len());
         assert_eq!(all, named.iter().sum(), "nothing else is outside");
     }

@@ -347,7 +347,7 @@ mod tests {
             let mesh = sphere(&parameters).expect("valid");
             let topology = mesh.topology();
             // A T-junction would leave outside faces in the interior.
-            let outside = topology.facets().iter().filter(|f| f.outside.is_none()).count();
+            let outside = topology.outer_facets().count();
             let named: usize = ["x_min", "y_min", "z_min", "outer"]
                 .into_iter()
                 .map(|name| topology.surface(name).expect("it has it").len())

@@ -1,10 +1,12 @@
 //! The outer faces of a mesh, and which of them meet at an edge.
 
+use std::collections::BTreeMap;
+
 use crate::disjoint_sets::DisjointSets;
 use crate::ids::NodeId;
 use crate::mesh::Mesh;
 use crate::tet4::{Point, area_vector, centroid, dot, norm, sub};
-use crate::topology::{Facet, triangle_edges};
+use crate::topology::{Facet, around_edges};
 
 /// Two outer faces and the edge that they, and no others, have in common.
 pub(super) struct Ridge {
@@ -22,8 +24,7 @@ pub struct Hull<'m> {
 impl<'m> Hull<'m> {
     /// The hull of a mesh.
     pub fn new(mesh: &'m Mesh) -> Self {
-        let outer = mesh.topology().facets().iter().filter(|f| f.outside.is_none());
-        Self { mesh, faces: outer.copied().collect() }
+        Self { mesh, faces: mesh.topology().outer_facets().copied().collect() }
     }
 
     /// The mesh.
@@ -54,21 +55,15 @@ impl<'m> Hull<'m> {
     }
 
     /// The edges of all faces with the faces at each.
-    fn edges(&self) -> Vec<([NodeId; 2], usize)> {
-        let of = |(face, facet): (usize, &Facet)| triangle_edges(facet.nodes).map(|edge| (edge, face));
-        let mut edges: Vec<_> = self.faces.iter().enumerate().flat_map(of).collect();
-        edges.sort_unstable();
-        edges
+    fn edges(&self) -> BTreeMap<[NodeId; 2], Vec<usize>> {
+        around_edges(&self.faces.iter().map(|face| face.nodes).collect::<Vec<_>>())
     }
 
     /// The edges at which two faces meet, and no more.
     pub(super) fn ridges(&self) -> Vec<Ridge> {
-        let edges = self.edges();
-        let at = |group: &[([NodeId; 2], usize)]| match *group {
-            [(nodes, first), (_, second)] => Some(Ridge { nodes, faces: [first, second] }),
-            _ => None,
-        };
-        edges.chunk_by(|a, b| a.0 == b.0).filter_map(at).collect()
+        let ridge =
+            |(nodes, at): ([NodeId; 2], Vec<usize>)| Some(Ridge { nodes, faces: at.try_into().ok()? });
+        self.edges().into_iter().filter_map(ridge).collect()
     }
 
     /// For every face whether it belongs to the wall of a hole: a closed part of the hull that encloses no element.
@@ -76,9 +71,7 @@ impl<'m> Hull<'m> {
     /// The volume inside such a part, `Σ x·A / 3` over its faces, is negative.
     pub(super) fn walls_of_holes(&self) -> Vec<bool> {
         let mut parts = DisjointSets::new(self.faces.len());
-        for group in self.edges().chunk_by(|a, b| a.0 == b.0) {
-            parts.join(group.iter().map(|&(_, face)| face));
-        }
+        self.edges().into_values().for_each(|at| parts.join(at));
         let mut volumes = vec![0.0; self.faces.len()];
         for face in 0..self.faces.len() {
             let root = parts.root(face);

@@ -8,7 +8,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use fluxmorph_geometry::box_tree::{AxisBox, BoxTree};
-use fluxmorph_geometry::tet4::{Point, cross, dot, norm, sub};
+use fluxmorph_geometry::depth::nearest_on_triangle;
+use fluxmorph_geometry::tet4::{Point, norm, sub};
+use fluxmorph_geometry::topology::rim_edges;
 use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 /// How far a node may lie from a piece of the old surface, as a share of that piece's longest edge. Two triangulations of
@@ -44,13 +46,8 @@ impl Triangulation {
 
     /// Edges of one triangle only, ascending.
     fn boundary_edges(&self) -> Vec<[usize; 2]> {
-        let mut count: BTreeMap<[usize; 2], usize> = BTreeMap::new();
-        for &[a, b, c] in &self.triangles {
-            for [i, j] in [[a, b], [b, c], [c, a]] {
-                *count.entry([i.min(j), i.max(j)]).or_default() += 1;
-            }
-        }
-        count.into_iter().filter(|&(_, triangles)| triangles == 1).map(|(edge, _)| edge).collect()
+        let triangles: Vec<_> = self.triangles.iter().map(|triangle| triangle.map(NodeId::new)).collect();
+        rim_edges(&triangles).into_iter().map(|edge| edge.map(NodeId::index)).collect()
     }
 
     /// Displacements of the nodes of `fresh`, from those of the nodes of this one, both of shape `(n_nodes, 3)` [m].
@@ -62,8 +59,9 @@ impl Triangulation {
     /// If there is not one displacement per node.
     pub fn transfer(&self, displacement: &[Point], fresh: &Self) -> Result<Vec<Point>, SurfaceMismatch> {
         assert_eq!(displacement.len(), self.places.len(), "one displacement per node");
-        let inner = Pieces::new(&self.places, self.triangles.iter().map(|t| t.to_vec()).collect());
-        let boundary = Pieces::new(&self.places, self.boundary_edges().iter().map(|e| e.to_vec()).collect());
+        let inner = Pieces::new(&self.places, self.triangles.clone());
+        let edges = self.boundary_edges().into_iter().map(|[a, b]| [a, b, b]);
+        let boundary = Pieces::new(&self.places, edges.collect());
         let on_boundary: BTreeSet<usize> = fresh.boundary_edges().into_iter().flatten().collect();
         let of = |(i, &place): (usize, &Point)| {
             let pieces = if on_boundary.contains(&i) { &boundary } else { &inner };
@@ -76,37 +74,34 @@ impl Triangulation {
     }
 }
 
-/// Triangles or edges, found by place.
+/// Triangles, or edges as triangles whose second and third node are the same, found by place.
 struct Pieces<'a> {
     places: &'a [Point],
-    pieces: Vec<Vec<usize>>,
+    pieces: Vec<[usize; 3]>,
     /// The box of every piece, as much wider as a node may lie apart.
     boxes: BoxTree,
 }
 
 impl<'a> Pieces<'a> {
-    fn new(places: &'a [Point], pieces: Vec<Vec<usize>>) -> Self {
-        let around = |piece: &Vec<usize>| {
-            let corners: Vec<Point> = piece.iter().map(|&n| places[n]).collect();
-            AxisBox::around(&corners).grown(NEAR * longest_edge(places, piece))
+    fn new(places: &'a [Point], pieces: Vec<[usize; 3]>) -> Self {
+        let around = |piece: &[usize; 3]| {
+            let corners = piece.map(|n| places[n]);
+            AxisBox::around(corners).grown(NEAR * longest_edge(corners))
         };
         let boxes = BoxTree::new(pieces.iter().map(around).collect());
         Self { places, pieces, boxes }
     }
 
     /// Nodes and their weights at the point of the pieces that lies nearest, the first of equals; `None` without one near.
-    fn nearest(&self, place: Point) -> Option<Vec<(usize, f64)>> {
-        let mut best: Option<(f64, Vec<(usize, f64)>)> = None;
+    fn nearest(&self, place: Point) -> Option<[(usize, f64); 3]> {
+        let mut best: Option<(f64, [(usize, f64); 3])> = None;
         for number in self.boxes.containing(place) {
-            let piece = &self.pieces[number];
-            let corners: Vec<Point> = piece.iter().map(|&n| self.places[n]).collect();
-            let weights = nearest_point(&corners, place);
-            let at: Point =
-                std::array::from_fn(|d| weights.iter().zip(&corners).map(|(w, x)| w * x[d]).sum());
-            let distance = norm(sub(place, at));
-            let near = distance <= NEAR * longest_edge(self.places, piece);
-            if near && best.as_ref().is_none_or(|(least, _)| distance < *least) {
-                best = Some((distance, piece.iter().copied().zip(weights).collect()));
+            let piece = self.pieces[number];
+            let corners = piece.map(|n| self.places[n]);
+            let (weights, distance) = nearest_on_triangle(place, &corners);
+            let near = distance <= NEAR * longest_edge(corners);
+            if near && best.is_none_or(|(least, _)| distance < least) {
+                best = Some((distance, std::array::from_fn(|k| (piece[k], weights[k]))));
             }
         }
         best.map(|(_, weights)| weights)
@@ -114,43 +109,8 @@ impl<'a> Pieces<'a> {
 }
 
 /// Length of the longest edge of a triangle, or of an edge [m].
-fn longest_edge(places: &[Point], piece: &[usize]) -> f64 {
-    let lengths = (0..piece.len()).map(|k| norm(sub(places[piece[k]], places[piece[(k + 1) % piece.len()]])));
-    lengths.fold(0.0, f64::max)
-}
-
-/// Weights of the corners at the point of a triangle or an edge that lies nearest to a place.
-fn nearest_point(corners: &[Point], place: Point) -> Vec<f64> {
-    if let &[a, b] = corners {
-        let (along, to) = (sub(b, a), sub(place, a));
-        let length = dot(along, along);
-        let share = if length > 0.0 { (dot(to, along) / length).clamp(0.0, 1.0) } else { 0.0 };
-        return vec![1.0 - share, share];
-    }
-    let area = |k: usize| {
-        let (b, c) = (corners[(k + 1) % 3], corners[(k + 2) % 3]);
-        cross(sub(c, b), sub(place, b))
-    };
-    let normal = cross(sub(corners[1], corners[0]), sub(corners[2], corners[0]));
-    let square = dot(normal, normal);
-    let weights: Vec<f64> = (0..3).map(|k| dot(area(k), normal) / square).collect();
-    // Of a triangle without area they are no numbers, and its edges are all of it.
-    if weights.iter().all(|weight| *weight >= 0.0) {
-        return weights;
-    }
-    let mut best = (f64::INFINITY, vec![1.0, 0.0, 0.0]);
-    for k in 0..3 {
-        let (i, j) = (k, (k + 1) % 3);
-        let share = nearest_point(&[corners[i], corners[j]], place);
-        let at: Point = std::array::from_fn(|d| share[0] * corners[i][d] + share[1] * corners[j][d]);
-        let distance = norm(sub(place, at));
-        if distance < best.0 {
-            let mut weights = vec![0.0; 3];
-            (weights[i], weights[j]) = (share[0], share[1]);
-            best = (distance, weights);
-        }
-    }
-    best.1
+fn longest_edge([a, b, c]: [Point; 3]) -> f64 {
+    [[a, b], [b, c], [c, a]].into_iter().map(|[p, q]| norm(sub(q, p))).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

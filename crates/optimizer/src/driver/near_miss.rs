@@ -25,8 +25,9 @@ const MARGIN: f64 = 0.01;
 /// How much farther, by the square of the excess: bounds are curved, by 30 times that for the aggregated thickness of a wall.
 const CURVATURE: f64 = 50.0;
 
-/// Projections onto the bounds in turn, most: few hold a design at a time.
-const SWEEPS: usize = 50;
+/// Projections onto the bounds in turn, most: few hold a design at a time, but two of them may oppose each other nearly, such as volume
+/// and loss of one conductor, whose gradients have the cosine −0.99 and take 300.
+const SWEEPS: usize = 2000;
 
 /// A design that is beyond a bound by little.
 #[derive(Clone, Debug)]
@@ -189,7 +190,7 @@ impl Run<'_> {
                 Ok(Some(reason))
             }
             Err(Stop::Error(error)) => Err(*error),
-            Err(Stop::Mesh(_) | Stop::CutShort | Stop::Astray) => Ok(Some(reason)),
+            Err(Stop::Mesh(_) | Stop::CutShort | Stop::Astray | Stop::Standing) => Ok(Some(reason)),
         }
     }
 
@@ -237,6 +238,11 @@ mod tests {
         // Where one variable is at its bound, the other goes all the way.
         let p = beyond(&[0.0, 0.3335]).stepped_back.expect("there is room");
         assert!(p[1] == 0.3335 && (0.333 - p[0] - 1e-4).abs() < 2e-6, "{p:?}");
+        // Bounds that nearly oppose each other leave a narrow way between them.
+        let narrow = [(1e-4, vec![1.0, 0.0]), (1e-4, vec![-0.99, 0.14])];
+        let p = missed(&[0.5; 2], &narrow, [&[0.0; 2], &[1.0; 2]]).stepped_back.expect("there is room");
+        let [dx, dy] = [p[0] - 0.5, p[1] - 0.5];
+        assert!(dx <= -1e-4 && 1e-4 - 0.99 * dx + 0.14 * dy <= 1e-6, "{dx} {dy}");
         // Where none can go, or bounds oppose each other, there is none.
         assert_eq!(beyond(&[0.333, 0.3335]).stepped_back, None);
         let opposed = missed(&[0.5], &[(1e-4, vec![1.0]), (1e-4, vec![-1.0])], [&[0.0], &[1.0]]);

@@ -232,8 +232,12 @@ impl<'a> Run<'a> {
             Some(StopReason::Interrupted) => Some(StopReason::Interrupted),
             _ if self.supervisor.had_ended(self.evaluations) => Some(StopReason::Superseded),
             _ if left == 0 => Some(StopReason::MaxEvaluations),
-            // The last one is for a step back within the bounds.
-            None if left == 1 && self.next_step_back()?.is_some() => Some(StopReason::MaxEvaluations),
+            // The last one is for a step back within the bounds, and so is the last before the search is looked at.
+            None if (left == 1 || self.supervisor.is_due(self.evaluations + 1))
+                && self.next_step_back()?.is_some() =>
+            {
+                Some(StopReason::MaxEvaluations)
+            }
             reason => reason,
         };
         reason.map_or_else(|| self.supervise(), |reason| Err(Stop::Limit(reason)))

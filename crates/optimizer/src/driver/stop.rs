@@ -13,6 +13,8 @@ pub(super) enum Stop {
     CutShort,
     /// Constraints are not kept, and many designs have not come nearer to that.
     Astray,
+    /// Many designs in a row are one, to rounding.
+    Standing,
     Error(Box<Error>),
 }
 

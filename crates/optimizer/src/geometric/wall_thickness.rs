@@ -11,6 +11,11 @@
 //! the initial one plus the node's height where that face is held. The normal on the moved mesh, which at a re-entrant edge may turn
 //! by a right angle, has no say in it. A node without direction has no thickness.
 //!
+//! At an edge where designed faces meet the direction leans to all of them, and a ray against it says nothing of the lip that they make
+//! with the faces opposite: there one ray runs behind each of these faces, against its own normal, from a place in it a thousandth of
+//! the way from the node to its middle; `d` is the normal. Where the faces meet at an acute angle they are each other's opposite, of no
+//! thickness at the edge: then it is the ray against the direction again.
+//!
 //! Between two design nodes the body may be thinner than behind both: before a step, a rib or a kink of the face opposite. So a ray runs
 //! from every node of that face as well, along `d`, to the triangle of the design surface that it leaves the body through; the roles of
 //! node and triangle are exchanged, and the formulas are the same with `d` turned around. What the thicknesses behind the corners of that
@@ -21,7 +26,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use fluxmorph_geometry::box_tree::BoxTree;
 use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::ray::{Hit, hit, reach};
-use fluxmorph_geometry::tet4::{Point, area_vector, dot, norm};
+use fluxmorph_geometry::tet4::{Point, add, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
@@ -34,6 +39,12 @@ const GRAZING: f64 = 0.1;
 
 /// Share of a distance by which it may differ from what those around it say by rounding.
 const ROUNDING: f64 = 1e-6;
+
+/// Cosine of the angle (thirty degrees) between normals of one face, beyond which there are two that meet in an edge.
+const ONE_FACE: f64 = 0.866;
+
+/// Share of the way from a node at an edge to the middle of a face beside it at which the ray behind that face begins.
+const INSET: f64 = 1e-3;
 
 /// Most steps from the direction at one design node to that where a ray from opposite leaves the body.
 const MOST_TURNS: usize = 5;
@@ -132,17 +143,25 @@ impl WallThickness {
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
                 let faces = &of[&body];
+                let at_edge = faces.behind_edge(node, (origin, *direction));
+                if !at_edge.is_empty() {
+                    return at_edge;
+                }
                 // Along the facets of a side that is round a ray from the rim meets one of them anywhere.
                 let grazing = || faces.grazed(origin, back).filter(|_| !faces.are_at_rim(node));
-                let (hit, nodes) = faces.opposite(origin, back).or_else(grazing)?;
-                Some(Opposite::new(node, &hit, *direction, (nodes, body)))
+                let found = faces.opposite(origin, back).or_else(grazing);
+                let measured = |(hit, nodes)| Opposite::new(node, &hit, *direction, (nodes, body));
+                found.map(|found| (*direction, measured(found))).into_iter().collect::<Vec<_>>()
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
             let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
             let own = behind.get(&node).into_iter().flatten();
-            let mut found: Vec<Opposite> = own.copied().filter_map(in_body).collect();
+            let mut found: Vec<_> = own.copied().flat_map(in_body).collect();
             if found.is_empty() {
-                found.extend(beside.map(|(region, _)| *region).find_map(in_body));
+                found = beside
+                    .map(|(region, _)| in_body(*region))
+                    .find(|found| !found.is_empty())
+                    .unwrap_or_default();
             }
             let may_have_none = || of.values().any(|faces| faces.are_at_rim(node));
             let is_whole = !found.is_empty() || may_have_none();
@@ -151,9 +170,10 @@ impl WallThickness {
         };
         let nodes = surface.nodes().iter().zip(surface.directions());
         let by_node = nodes.map(opposite_of).collect::<Result<Vec<_>, _>>()?;
-        let with_place = |(i, found): (usize, Vec<Opposite>)| found.into_iter().map(move |own| (i, own));
+        let facing: Vec<_> = of.values().flat_map(|own| own.facing(mesh, surface, &by_node)).collect();
+        let with_place =
+            |(i, found): (usize, Vec<(Point, Opposite)>)| found.into_iter().map(move |(_, own)| (i, own));
         let mut opposite: Vec<_> = by_node.into_iter().enumerate().flat_map(with_place).collect();
-        let facing: Vec<_> = of.values().flat_map(|own| own.facing(mesh, surface, &opposite)).collect();
         opposite.extend(facing);
         opposite.sort_by_key(|&(place, _)| place);
         if opposite.is_empty() { Err(NoThickness::default()) } else { Ok(Self { opposite }) }
@@ -287,12 +307,14 @@ struct BodyFaces {
     /// The nodes of those that are part of the design surface, and of the others.
     designed_nodes: HashSet<NodeId>,
     other_nodes: HashSet<NodeId>,
+    is_designed: Vec<bool>,
 }
 
 impl BodyFaces {
     fn new(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Self {
         let nodes = mesh.topology().boundary(region);
         let is_designed = |face: &&[NodeId; 3]| face.iter().all(|n| surface.nodes().binary_search(n).is_ok());
+        let flags = nodes.iter().map(|face| is_designed(&face)).collect();
         let (designed, others): (Vec<_>, Vec<_>) = nodes.iter().partition(is_designed);
         let [designed_nodes, other_nodes] =
             [designed, others].map(|faces: Vec<&[NodeId; 3]>| faces.into_iter().flatten().copied().collect());
@@ -302,7 +324,38 @@ impl BodyFaces {
         for (i, face) in nodes.iter().enumerate() {
             face.iter().for_each(|&n| at_node.entry(n).or_default().push(i));
         }
-        Self { body: region, nodes, corners, at_node, tree, designed_nodes, other_nodes }
+        Self { body: region, nodes, corners, at_node, tree, designed_nodes, other_nodes, is_designed: flags }
+    }
+
+    /// What lies opposite of a node behind each of the designed faces that meet in an edge there, by the normal of that face; none where
+    /// it is one face, but for those that run along the node's direction.
+    fn behind_edge(&self, node: NodeId, (origin, direction): (Point, Point)) -> Vec<(Point, Opposite)> {
+        let mut parts: Vec<(Point, Vec<usize>)> = Vec::new();
+        for &face in self.at_node.get(&node).into_iter().flatten().filter(|&&face| self.is_designed[face]) {
+            let normal = unit(area_vector(self.corners[face]));
+            if dot(normal, direction) < GRAZING {
+                continue;
+            }
+            match parts.iter_mut().find(|(first, _)| dot(*first, normal) > ONE_FACE) {
+                Some((_, faces)) => faces.push(face),
+                None => parts.push((normal, vec![face])),
+            }
+        }
+        if parts.len() < 2 {
+            return Vec::new();
+        }
+        let behind = |(_, faces): (Point, Vec<usize>)| {
+            let corners = || faces.iter().map(|&face| &self.corners[face]);
+            let normal = unit(corners().map(|own| area_vector(*own)).fold([0.0; 3], add));
+            let middle =
+                corners().map(|own| centroid(*own)).fold([0.0; 3], add).map(|x| x / faces.len() as f64);
+            let beside = add(origin, sub(middle, origin).map(|x| INSET * x));
+            let (hit, nodes) = self.opposite(beside, normal.map(|c| -c))?;
+            let found = Opposite::new(node, &hit, normal, (nodes, self.body));
+            let distance = found.distance + dot(found.growth, sub(origin, beside));
+            (!nodes.contains(&node)).then_some((normal, Opposite { distance, ..found }))
+        };
+        parts.into_iter().filter_map(behind).collect()
     }
 
     /// The body before every node of the faces that the design surface does not have, where that says more than what lies behind the
@@ -311,11 +364,21 @@ impl BodyFaces {
         &self,
         mesh: &Mesh,
         surface: &DesignSurface,
-        behind: &[(usize, Opposite)],
+        behind: &[Vec<(Point, Opposite)>],
     ) -> Vec<(usize, Opposite)> {
-        let own = behind.iter().filter(|(_, own)| own.body == self.body);
-        let distances: HashMap<NodeId, f64> =
-            own.map(|(place, own)| (surface.nodes()[*place], own.distance)).collect();
+        // By the direction that they are along.
+        let mut distances: HashMap<NodeId, Vec<(Point, f64)>> = HashMap::new();
+        for (&node, found) in surface.nodes().iter().zip(behind) {
+            let own = found.iter().filter(|(_, own)| own.body == self.body);
+            let own: Vec<_> = own.map(|(along, own)| (*along, own.distance)).collect();
+            if !own.is_empty() {
+                distances.insert(node, own);
+            }
+        }
+        let said_at = |node: &NodeId, along: Point| {
+            let nearest = distances[node].iter().max_by(|a, b| dot(a.0, along).total_cmp(&dot(b.0, along)));
+            nearest.map_or(0.0, |own| own.1)
+        };
         let place_of = |node: NodeId| surface.nodes().binary_search(&node).expect("it was measured from");
         let mut measured: Vec<NodeId> = distances.keys().copied().collect();
         measured.sort_unstable();
@@ -334,7 +397,7 @@ impl BodyFaces {
                 }
                 along = there;
             };
-            let said: f64 = nodes.iter().zip(met.weights).map(|(n, weight)| weight * distances[n]).sum();
+            let said: f64 = nodes.iter().zip(met.weights).map(|(n, weight)| weight * said_at(n, along)).sum();
             let bulge = said - met.distance;
             let heaviest = (0..3).max_by(|&a, &b| met.weights[a].total_cmp(&met.weights[b]))?;
             let found = Opposite::new(node, &met, along.map(|c| -c), (nodes, self.body));

@@ -32,7 +32,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
-use fluxmorph_geometry::topology::{face_key, triangle_edges};
+use fluxmorph_geometry::topology::{around_edges, face_key, triangle_edges};
 use fluxmorph_geometry::{Mesh, NodeId};
 
 use super::inside_of_outer_faces;
@@ -42,7 +42,7 @@ use crate::element::triangle::Triangle;
 use crate::element::{Complex3, dot3};
 use crate::fixed_directions::CREASE;
 use crate::model::FieldModel;
-use crate::reentrant::{around_edges, is_reentrant};
+use crate::reentrant::is_reentrant;
 use crate::solution::FieldSolution;
 use crate::surface::{Conductor, SurfaceLaw};
 
@@ -131,7 +131,7 @@ pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) 
     }
     let of_surfaces = solution.surface_losses(model, mesh).into_iter();
     let losses: HashMap<[NodeId; 3], f64> = of_surfaces.map(|(_, t, loss)| (face_key(t), loss)).collect();
-    let outer = || mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+    let outer = || mesh.topology().outer_facets();
     let inside = inside_of_outer_faces(mesh);
     let replaced: HashSet<[NodeId; 3]> =
         model.conductors().iter().flat_map(|own| &own.surface).map(|t| face_key(*t)).collect();

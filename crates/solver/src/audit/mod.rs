@@ -219,8 +219,7 @@ impl ConductorFace {
 
 /// The elements at the outer faces, by the keys of these.
 fn inside_of_outer_faces(mesh: &Mesh) -> HashMap<[NodeId; 3], ElementId> {
-    let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-    outer.map(|facet| (face_key(facet.nodes), facet.inside)).collect()
+    mesh.topology().outer_facets().map(|facet| (face_key(facet.nodes), facet.inside)).collect()
 }
 
 /// The faces of the regions of a conductor, as one.

@@ -73,13 +73,8 @@ pub fn check(mesh: &Mesh, coils: &[Coil], surfaces: &[ConditionedSurface<'_>]) -
             surface_of.entry(face_key(*triangle)).or_insert(i);
         }
     }
-    let open: Vec<[NodeId; 3]> = mesh
-        .topology()
-        .facets()
-        .iter()
-        .filter(|f| f.outside.is_none() && !surface_of.contains_key(&face_key(f.nodes)))
-        .map(|f| f.nodes)
-        .collect();
+    let outer = mesh.topology().outer_facets().map(|facet| facet.nodes);
+    let open: Vec<[NodeId; 3]> = outer.filter(|face| !surface_of.contains_key(&face_key(*face))).collect();
     let rest = ConditionedSurface { name: "", condition: Condition::Open, triangles: &open };
     for coil in coils {
         let found = match &coil.shape {
@@ -225,7 +220,7 @@ fn wall_fault(
 ) -> Option<(String, Point, PlaneFault)> {
     let density = current.current_density();
     let mut walls: Vec<Vec<Wall>> = (0..=surfaces.len()).map(|_| Vec::new()).collect();
-    for facet in mesh.topology().facets().iter().filter(|f| f.outside.is_none()) {
+    for facet in mesh.topology().outer_facets() {
         let Ok(i) = density.binary_search_by_key(&facet.inside, |(e, _)| *e) else { continue };
         let j = density[i].1;
         let vertices = facet.nodes.map(|n| mesh.point(n));

@@ -4,7 +4,7 @@
 //! others. The matrix `V g_a·g_b` is symmetric positive definite and factored once.
 
 use fluxmorph_geometry::fem::{
-    BlockPattern, Cholesky, CholeskyAnalysis, Coupling, CsrMatrix, DofMap, ElementGroup, LocalMatrix,
+    BlockPattern, Coupling, CsrMatrix, DofMap, ElementGroup, Ldlt, LdltAnalysis, LocalMatrix, ordering,
 };
 use fluxmorph_geometry::tet4::{Point, Tet4, dot, sub};
 use fluxmorph_geometry::{MeshError, NodeId};
@@ -27,7 +27,7 @@ pub(super) struct Potential<'a> {
     patch: &'a Patch,
     dofs: DofMap<1>,
     /// `None` where every node is given.
-    factor: Option<Cholesky>,
+    factor: Option<Ldlt<f64>>,
 }
 
 impl<'a> Potential<'a> {
@@ -42,7 +42,11 @@ impl<'a> Potential<'a> {
         pattern.assemble(&pattern.bind(&group), &mut matrix.values, |e| Laplace(&patch.tets[e.index()]));
         let factor = match dofs.count() {
             0 => None,
-            _ => Some(Cholesky::new(&CholeskyAnalysis::new(pattern.structure())?, &matrix)?),
+            _ => {
+                let order = ordering::dissection(pattern.structure());
+                let analysis = LdltAnalysis::new(pattern.structure(), order)?;
+                Some(Ldlt::positive_definite(&analysis, |_, k| matrix.values[k])?)
+            }
         };
         Ok(Self { patch, dofs, factor })
     }

@@ -241,7 +241,7 @@ fn natural(
     is_asked_for: impl Fn(&NodeId) -> bool,
 ) -> Result<Vec<(NodeId, Point)>, SolverError> {
     let topology = model.topology();
-    let outer = topology.facets().iter().filter(|facet| facet.outside.is_none()).map(|facet| facet.nodes);
+    let outer = topology.outer_facets().map(|facet| facet.nodes);
     let mut faces: Vec<[NodeId; 3]> = outer.filter(|nodes| nodes.iter().any(&is_asked_for)).collect();
     if faces.is_empty() {
         return Ok(Vec::new());

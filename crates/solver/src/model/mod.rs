@@ -251,11 +251,6 @@ impl FieldModel {
         self.weak_form.stretch_of(e).is_some()
     }
 
-    /// Elements that a coil meets, with its window.
-    pub fn source_elements(&self) -> impl Iterator<Item = ElementId> + '_ {
-        self.all_sources().flat_map(Sources::coil_elements)
-    }
-
     /// The coil whose region an element is in, whatever its current. An analytic coil has no faces in the mesh.
     pub(crate) fn coil_at(&self, element: ElementId) -> Option<usize> {
         self.coils().iter().position(|coil| {

@@ -57,12 +57,11 @@ impl Walls {
         });
         let symmetry = SymmetryPlanes::new(mesh, boundaries, &conditions)?;
         conditions.extend(gradients.iter().map(|face| (face_key(*face), Condition::Other)));
-        let outer = topology.facets().iter().filter(|facet| facet.outside.is_none());
         let of_face = |facet: &Facet| {
             let condition = conditions.get(&face_key(facet.nodes)).copied().unwrap_or(Condition::Other);
             facet.nodes.map(|node| (node, facet.nodes, condition))
         };
-        let mut faces: Vec<_> = outer.flat_map(of_face).collect();
+        let mut faces: Vec<_> = topology.outer_facets().flat_map(of_face).collect();
         faces.sort_unstable();
         Ok(Self { faces, symmetry })
     }

@@ -65,7 +65,7 @@ impl Plane {
     /// Whether the field beyond it is the image of that of the mesh: which lies on one side of it, with no outer face of another
     /// condition in the plane. Natural faces have that of flux-normal ones.
     pub(super) fn is_symmetry(&self, mesh: &Mesh, conditions: &HashMap<[NodeId; 3], Condition>) -> bool {
-        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
+        let outer = mesh.topology().outer_facets();
         let mut in_plane = outer.filter(|facet| facet.nodes.iter().all(|&n| self.holds(mesh.point(n))));
         let is_alike = |facet: &Facet| {
             let condition = conditions.get(&face_key(facet.nodes)).copied().unwrap_or(Condition::FluxNormal);

@@ -10,8 +10,8 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use fluxmorph_geometry::curved::SMOOTH;
 use fluxmorph_geometry::directions::{extend, tangents, unit};
 use fluxmorph_geometry::tet4::{FACES, Point, area_vector, dot};
-use fluxmorph_geometry::topology::{face_key, triangle_edges};
-use fluxmorph_geometry::{ElementId, Facet, Mesh, MeshError, NodeId, Topology};
+use fluxmorph_geometry::topology::{around_edges, face_key, triangle_edges};
+use fluxmorph_geometry::{ElementId, Mesh, MeshError, NodeId, Topology};
 
 use super::plane::{Condition, Plane, ROUNDING};
 use crate::boundary::Boundary;
@@ -99,16 +99,12 @@ impl SymmetryPlanes {
 /// The outer faces that go on in another plane without a sharp edge, with all that lie in one plane with such a face and are joined
 /// to it; by their keys.
 fn round_faces(mesh: &Mesh) -> HashSet<[NodeId; 3]> {
-    let outer: Vec<&Facet> =
-        mesh.topology().facets().iter().filter(|facet| facet.outside.is_none()).collect();
-    let normals: Vec<Point> =
-        outer.iter().map(|facet| unit(area_vector(facet.nodes.map(|node| mesh.point(node))))).collect();
-    let mut at_edges: HashMap<[NodeId; 2], Vec<usize>> = HashMap::new();
-    for (k, facet) in outer.iter().enumerate() {
-        triangle_edges(facet.nodes).into_iter().for_each(|edge| at_edges.entry(edge).or_default().push(k));
-    }
+    let outer: Vec<[NodeId; 3]> = mesh.topology().outer_facets().map(|facet| facet.nodes).collect();
+    let normal = |face: &[NodeId; 3]| unit(area_vector(face.map(|node| mesh.point(node))));
+    let normals: Vec<Point> = outer.iter().map(normal).collect();
+    let at_edges = around_edges(&outer);
     let beside = |k: usize| {
-        let faces = triangle_edges(outer[k].nodes).map(|edge| &at_edges[&edge]);
+        let faces = triangle_edges(outer[k]).map(|edge| &at_edges[&edge]);
         faces.into_iter().flatten().copied().filter(move |other| *other != k)
     };
     let cosine = |k: usize, other: usize| dot(normals[k], normals[other]);
@@ -119,7 +115,7 @@ fn round_faces(mesh: &Mesh) -> HashSet<[NodeId; 3]> {
     while let Some(k) = open.pop() {
         open.extend(beside(k).filter(|other| cosine(k, *other) >= flat && round.insert(*other)));
     }
-    round.into_iter().map(|k| face_key(outer[k].nodes)).collect()
+    round.into_iter().map(|k| face_key(outer[k])).collect()
 }
 
 /// A surface's planes, and its faces with the number of the plane of each.
@@ -189,12 +185,8 @@ mod tests {
         };
         let points = grid.points().into_iter().map(round).collect();
         let mesh = Mesh::new(Arc::new(topology), points).expect("cells have a volume");
-        let outer = mesh.topology().facets().iter().filter(|facet| facet.outside.is_none());
-        let turned = |(k, facet): (usize, &Facet)| {
-            let [a, b, c] = facet.nodes;
-            if k % 3 == 0 { [a, c, b] } else { [a, b, c] }
-        };
-        let surface: Vec<[NodeId; 3]> = outer.enumerate().map(turned).collect();
+        let mut surface: Vec<[NodeId; 3]> = mesh.topology().outer_facets().map(|facet| facet.nodes).collect();
+        surface.iter_mut().step_by(3).for_each(|face| face.swap(1, 2));
         let conditions = surface.iter().map(|face| (face_key(*face), Condition::FluxParallel)).collect();
         let mut planes = SymmetryPlanes::default();
         planes.add(&mesh, &surface, &conditions, &OnceCell::new());

@@ -65,7 +65,21 @@ impl<T: FactorScalar> Ldlt<T> {
         T::factor(analysis, &entry, None)
     }
 
-    /// The same with panels that another factor of this analysis left, wherever the matrix is as it was in all that they come from:
+    /// The same of a real matrix that must be positive definite.
+    ///
+    /// # Errors
+    /// As [`Ldlt::new`], and when a pivot is negative.
+    pub fn positive_definite(
+        analysis: &Arc<LdltAnalysis>,
+        entry: impl Fn(usize, usize) -> T + Sync,
+    ) -> Result<Self, MeshError>
+    where
+        T: PartialOrd,
+    {
+        Self::new(analysis, entry)?.of_positive_definite()
+    }
+
+    /// As [`Ldlt::new`] with panels that another factor of this analysis left, wherever the matrix is as it was in all that they come from:
     /// the bits are those of [`Ldlt::new`].
     ///
     /// # Errors

@@ -50,6 +50,24 @@ impl<T> Ldlt<T> {
             + self.panels.len() * (size_of::<Arc<FactoredPanel<T>>>() + size_of::<FactoredPanel<T>>())
     }
 
+    /// The factor, if its matrix is positive definite: if all pivots are positive.
+    ///
+    /// # Errors
+    /// [`MeshError::Factorisation`] at the first pivot that is not.
+    pub(super) fn of_positive_definite(self) -> Result<Self, MeshError>
+    where
+        T: PanelScalar + PartialOrd,
+    {
+        let pivots = self.panels.iter().flat_map(|panel| &panel.pivots);
+        let lost = self.analysis.order.iter().zip(pivots).find(|&(_, &pivot)| pivot <= T::default());
+        let failed = |(unknown, pivot)| MeshError::Factorisation {
+            unknowns: self.size(),
+            cause: format!("the pivot of unknown {unknown} is {pivot}: the matrix is not positive definite"),
+        };
+        lost.map(failed).map_or(Ok(()), Err)?;
+        Ok(self)
+    }
+
     /// What the factor of another matrix may begin with: the panels that the analysis says are kept, if it has some.
     pub fn kept(&self) -> Option<KeptPanels<T>> {
         let analysis = &self.analysis;

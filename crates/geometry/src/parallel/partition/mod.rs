@@ -9,7 +9,6 @@
 //! Lives here: who owns what. Does not live here: how ranks talk.
 
 mod graph;
-mod report;
 mod sets;
 
 use crate::error::MeshError;
@@ -19,7 +18,6 @@ use crate::tet4::{EDGES, dot, sub};
 use crate::topology::Topology;
 use fluxmorph_petsc::metis;
 use graph::{Graph, Strength};
-pub use report::{ConductorShare, PartitionReport, RankShare};
 
 /// Vertices a rank from which METIS is asked: on smaller graphs it leaves parts empty, and prints a warning.
 const FEWEST_VERTICES: usize = 16;
@@ -113,7 +111,7 @@ impl Partition {
         if ranks == 1 {
             return Ok(Self::of_owners(topology, ranks, vec![0; nodes]));
         }
-        let weights: Vec<u64> = weights.iter().map(|&w| node_weight(w)).collect();
+        let weights: Vec<u64> = weights.iter().map(|&w| u64::from(w.max(1))).collect();
         let graph = Graph::new(topology, ranks, &weights, kept, strength);
         let part = cut(&graph, ranks).unwrap_or_else(|| ranges(&graph.weights, ranks));
         let mut owners: Vec<u32> = graph.vertex_of.iter().map(|&v| part[v as usize]).collect();
@@ -173,19 +171,6 @@ impl Partition {
         let touches = |e: &ElementId| topology.tet(*e).iter().any(|&n| self.owner_of(n) == rank);
         topology.elements().filter(touches).collect()
     }
-
-    /// How even the partition is, and what it cuts; `weights` and `kept` as given to [`Partition::new`].
-    ///
-    /// # Panics
-    /// If there are fewer weights than nodes, or a kept element does not exist.
-    pub fn report(&self, topology: &Topology, weights: &[u32], kept: &[ElementId]) -> PartitionReport {
-        PartitionReport::new(self, topology, weights, kept)
-    }
-}
-
-/// What a node with so many unknowns weighs.
-fn node_weight(unknowns: u32) -> u64 {
-    u64::from(unknowns.max(1))
 }
 
 /// METIS's parts of the graph; `None` where it is too small or too heavy for it.

@@ -16,11 +16,16 @@ fn plate(topology: &Topology) -> Vec<ElementId> {
     topology.elements_of(topology.region("plate").expect("the shield has it"))
 }
 
-fn partition(topology: &Topology, ranks: usize, kept: &[ElementId]) -> (Partition, PartitionReport) {
+fn partition(topology: &Topology, ranks: usize, kept: &[ElementId]) -> Partition {
     let weights = vec![3; topology.node_count()];
-    let partition = Partition::new(topology, ranks, &weights, kept).expect("fewer ranks than nodes");
-    let report = partition.report(topology, &weights, kept);
-    (partition, report)
+    Partition::new(topology, ranks, &weights, kept).expect("fewer ranks than nodes")
+}
+
+/// Whether all nodes of some elements have one owner.
+fn is_whole(topology: &Topology, partition: &Partition, elements: &[ElementId]) -> bool {
+    let mut owners = elements.iter().flat_map(|&e| topology.tet(e)).map(|n| partition.owner_of(n));
+    let first = owners.next();
+    owners.all(|owner| Some(owner) == first)
 }
 
 /// Edges of some elements between ranks.
@@ -43,11 +48,14 @@ fn ranks_get_the_same_weight_within_five_percent() {
     let topology = mesh.topology();
     for ranks in [2, 4, 7] {
         for kept in [Vec::new(), plate(topology)] {
-            let (_, report) = partition(topology, ranks, &kept);
+            let partition = partition(topology, ranks, &kept);
+            let largest = (0..ranks).map(|rank| partition.nodes_of(rank).len()).max().unwrap_or(0);
+            let imbalance = (largest * ranks) as f64 / topology.node_count() as f64;
             // METIS is asked for two per cent; three more are its licence on graphs with heavy edges.
-            assert!(report.imbalance() <= 1.05, "{ranks} ranks: {report:?}");
+            assert!(imbalance <= 1.05, "{ranks} ranks: {imbalance}");
             let edges = topology.tets().len() * 7 / 6;
-            assert!(report.edge_cut < edges / 5, "{ranks} ranks cut {} of {edges}", report.edge_cut);
+            let cut = cut_in(topology, &partition, &topology.elements().collect::<Vec<_>>());
+            assert!(cut < edges / 5, "{ranks} ranks cut {cut} of {edges}");
         }
     }
 }
@@ -57,7 +65,7 @@ fn every_node_and_element_has_one_owner_and_a_rank_computes_what_it_owns() {
     let mesh = thin();
     let topology = mesh.topology();
     for ranks in [1, 2, 3, 7, 40] {
-        let (partition, report) = partition(topology, ranks, &plate(topology));
+        let partition = partition(topology, ranks, &plate(topology));
         assert_eq!(partition.ranks(), ranks);
         let mut nodes: Vec<NodeId> = (0..ranks).flat_map(|r| partition.nodes_of(r)).copied().collect();
         nodes.sort_unstable();
@@ -72,7 +80,6 @@ fn every_node_and_element_has_one_owner_and_a_rank_computes_what_it_owns() {
             let touching = partition.touching(topology, rank);
             assert!(touching.is_sorted());
             assert!(partition.elements_of(rank).iter().all(|e| touching.binary_search(e).is_ok()));
-            assert_eq!(report.ranks[rank].touching, touching.len());
         }
         for e in topology.elements() {
             let votes = |rank| topology.tet(e).iter().filter(|&&n| partition.owner_of(n) == rank).count();
@@ -88,9 +95,8 @@ fn a_thin_plate_is_whole() {
     let topology = mesh.topology();
     let plate = plate(topology);
     for ranks in [2, 4, 7] {
-        let (partition, report) = partition(topology, ranks, &plate);
-        assert_eq!(report.conductors.len(), 1);
-        assert!(report.conductors[0].is_whole(), "{ranks} ranks: {:?}", report.conductors);
+        let partition = partition(topology, ranks, &plate);
+        assert!(is_whole(topology, &partition, &plate), "{ranks} ranks");
         let owner = partition.element_owner(plate[0]);
         assert!(plate.iter().all(|&e| partition.element_owner(e) == owner));
     }
@@ -104,8 +110,10 @@ fn a_large_conductor_is_cut_where_it_is_thin() {
     let topology = mesh.topology();
     let plate = plate(topology);
     let (ranks, all) = (7, vec![3; topology.node_count()]);
-    let (kept, report) = partition(topology, ranks, &plate);
-    assert!(!report.conductors[0].is_whole() && report.conductors[0].nodes > topology.node_count() / 14);
+    let kept = partition(topology, ranks, &plate);
+    assert!(!is_whole(topology, &kept, &plate));
+    let nodes = sets::ConnectedSets::new(topology, &plate).nodes[0].len();
+    assert!(nodes > topology.node_count() / 14, "{nodes}");
     let free = Partition::new(topology, ranks, &all, &[]).expect("fewer ranks than nodes");
     let cut = [&kept, &free].map(|partition| cut_in(topology, partition, &plate));
     assert!(cut[0] > 0 && cut[0] <= cut[1], "{cut:?}");

@@ -275,6 +275,39 @@ fn a_dent_between_the_rays_is_measured_from_its_own_node() {
     assert!((moved.thickness - wall.thickness - height(above)).abs() < 1e-12);
 }
 
+/// A slab all of whose faces move along their normals, in a corner of the mesh: the lip at its rim is as thick as it is across, where a ray
+/// against the mitred direction would say √2 times as much, and nothing of its other side.
+#[test]
+fn a_lip_at_an_edge_of_designed_faces_is_measured_across() {
+    let mesh = parts([[0.0; 3], [2.0, 2.0, 1.0]], 0.25, &[("slab", [[0.0, 0.0, 0.25], [1.0, 1.0, 0.5]])]);
+    let slab = mesh.topology().region("slab").expect("it has one");
+    let all = mesh.topology().boundary(slab).into_iter();
+    let is_inside = |face: &[NodeId; 3]| (0..2).all(|d| face.iter().any(|n| mesh.point(*n)[d] > 0.0));
+    let faces: Vec<[NodeId; 3]> = all.filter(is_inside).collect();
+    let surface = DesignSurface::new(&mesh, &DesignSetup::new(&faces, Direction::Normal))
+        .expect("every node is a variable");
+    let thickness = WallThickness::measure(&mesh, &[slab], &surface).expect("it has faces opposite");
+    let is_at_rim = |x: Point| x[0] == 1.0 || x[1] == 1.0;
+    // Across at every node of both faces; the side behind those of its rim and its own.
+    let across = thickness.initial().filter(|(_, t)| (t - 0.25).abs() < 1e-12).count();
+    assert_eq!(across, 2 * 5 * 5);
+    assert!(thickness.initial().all(|(_, t)| (t - 0.25).abs() < 1e-12 || (t - 1.0).abs() < 1e-12));
+    // The rim goes in by .05 on all three sides.
+    let lip = |n: NodeId| {
+        let x = mesh.point(n);
+        let Ok(place) = surface.nodes().binary_search(&n) else { return x };
+        let depth = if is_at_rim(x) { 0.05 * surface.mitres()[place] } else { 0.0 };
+        std::array::from_fn(|d| x[d] - depth * surface.directions()[place][d])
+    };
+    let least = thickness.least_at_nodes(lip);
+    for (place, thickness) in least {
+        let at = mesh.point(surface.nodes()[place]);
+        let expected = if is_at_rim(at) { 0.15 } else { 0.25 };
+        // Rays begin a thousandth of a facet beside the rim, where the face opposite is as much nearer to what it was.
+        assert!((thickness - expected).abs() < 2e-4, "{at:?}: {thickness} {expected}");
+    }
+}
+
 /// The wall behind a node that moves along z over a plane, which leans by as much as it likes.
 #[test]
 fn a_plane_that_leans_and_moves_along_its_normal_is_as_far_as_along_the_ray() {
