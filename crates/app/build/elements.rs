@@ -173,8 +173,8 @@ struct Iron<'a> {
 impl Iron<'_> {
     /// What there is to say of the permeability, for which that of a curve has no one number.
     fn permeability(&self) -> String {
-        let or_more = if self.is_of_curve { " or more along its curve" } else { "" };
-        format!("{}{or_more}", Readable(self.relative_permeability))
+        let taken = if self.is_of_curve { ", taken for its curve" } else { "" };
+        format!("{}{taken}", Readable(self.relative_permeability))
     }
 
     /// What there is to say beside the permeability.

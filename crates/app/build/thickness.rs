@@ -17,14 +17,15 @@ pub(super) fn cut_warning(config: &Config, shape: Option<&Shape>, full_mesh: &Me
     // In it a region that its surface replaces ends where the device does.
     let topology = full_mesh.topology();
     let outer: HashSet<_> = topology.outer_facets().map(|facet| face_key(facet.nodes)).collect();
-    let opposite: Vec<_> = shape?.thickness()?.opposite_faces().map(face_key).collect();
-    let cut: Vec<_> = opposite.iter().filter(|face| outer.contains(*face)).collect();
+    let opposite = shape?.thickness()?.opposite_faces().map(|(place, face)| (place, face_key(face)));
+    let opposite: Vec<_> = opposite.collect();
+    let cut: Vec<_> = opposite.iter().filter(|(_, face)| outer.contains(face)).collect();
     if cut.is_empty() {
         return None;
     }
     let ends_at = |name: &&String| {
         let faces = faces_of(topology, [name.as_str()]);
-        cut.iter().any(|face| faces.contains(*face))
+        cut.iter().any(|(_, face)| faces.contains(face))
     };
     let named: Vec<String> =
         config.boundaries.surfaces().filter(ends_at).map(|name| format!("`{name}`")).collect();
@@ -33,7 +34,14 @@ pub(super) fn cut_warning(config: &Config, shape: Option<&Shape>, full_mesh: &Me
         "`{}`: the thickness behind {} of {} design nodes ends at {at}, at the outside of the mesh, and is that of the meshed part; where \
          that is a plane of symmetry, halve the bound",
         constraint.name,
-        cut.len(),
-        opposite.len()
+        nodes_of(cut.iter().map(|(place, _)| *place)),
+        nodes_of(opposite.iter().map(|(place, _)| *place))
     ))
+}
+
+/// How many places there are, which ascend.
+fn nodes_of(places: impl Iterator<Item = usize>) -> usize {
+    let mut places: Vec<usize> = places.collect();
+    places.dedup();
+    places.len()
 }

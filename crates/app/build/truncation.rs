@@ -188,7 +188,7 @@ impl Truncation {
         let source_size_m = size(&whole, &places, &planes_of_symmetry(mesh, &sides, rounding));
         let near = if is_plane_device(&sides) { NEAR_IN_A_PLANE } else { NEAR };
         let (surface, at_m) = name(&hull, side);
-        let confined = return_path::confined(&sides, model, mesh);
+        let confined = return_path::confined(&sides, (model, mesh), rounding);
         let in_words = |plane| {
             let (surface, at_m) = name(&hull, plane);
             named(&surface, at_m, "`")

@@ -2,9 +2,8 @@
 //! `-- CELLS …` over others.
 //!
 //! Three decoupled Laplacians with a complex mass on a block of cubes of six tetrahedra, as the vector potential has where
-//! no material changes. Every case runs in a process of its own, because the
-//! largest memory of a process never falls again. Memory is what Linux counts (`VmHWM`) from before the factorisation on,
-//! in parts of the factor.
+//! no material changes. Every case runs in a process of its own, because the largest memory of a process never falls again.
+//! Memory is what Linux counts (`VmHWM`) from before the factorisation on, in parts of the factor.
 
 use std::process::Command;
 use std::sync::Arc;

@@ -80,6 +80,10 @@ fn a_symmetric_factor_of_what_is_no_number_is_refused_in_all_number_types() {
         is_refused(Ldlt::new(&analysis, |_, k| matrix.values[k] as f32), &format!("f32, damage {k}"));
         let complex = |_: usize, k: usize| c32::new(1.0, matrix.values[k] as f32);
         is_refused(Ldlt::new(&analysis, complex), &format!("c32, damage {k}"));
+        is_refused(
+            Ldlt::positive_definite(&analysis, |_, k| matrix.values[k] as f32),
+            &format!("positive definite, damage {k}"),
+        );
     }
 }
 

@@ -12,7 +12,12 @@ use super::{Side, Standing};
 
 /// Two planes that coils or matter reach and flux passes, where no flux passes what joins them: those at the ends of a slice, or of a
 /// sector that leaves out its axis. Planes that meet have an edge along which nothing holds `A`.
-pub(super) fn confined<'s>(sides: &'s [Side], model: &FieldModel, mesh: &Mesh) -> Option<[&'s Side; 2]> {
+/// Parts of one plane are not two.
+pub(super) fn confined<'s>(
+    sides: &'s [Side],
+    (model, mesh): (&FieldModel, &Mesh),
+    rounding: f64,
+) -> Option<[&'s Side; 2]> {
     let held = held_edges(model, mesh);
     let is_closed = |side: &&Side| {
         // Of a flux-parallel plane the edges inside are held as well.
@@ -21,8 +26,10 @@ pub(super) fn confined<'s>(sides: &'s [Side], model: &FieldModel, mesh: &Mesh) -
         is_plane && rim_edges(&side.triangles).iter().all(|edge| held.contains(edge)) && is_free()
     };
     let closed: Vec<&Side> = sides.iter().filter(is_closed).collect();
-    let [first, second, ..] = closed[..] else { return None };
-    Some([first, second])
+    closed.iter().enumerate().find_map(|(i, &side)| {
+        let other = closed[i + 1..].iter().find(|other| !side.is_coplanar(other, rounding))?;
+        Some([side, *other])
+    })
 }
 
 /// Edges along which `A` is zero.

@@ -224,10 +224,9 @@ pub(super) fn summary<'a>(
     let moves = config.remesh.as_ref().zip(problem.shape());
     let skin = setup.audits.iter().map(SkinSummary::of).collect();
     let reference = problem.original().topology();
-    let mut warnings = advice(config, &setup);
-    warnings.splice(0..0, setup.warnings.iter().cloned());
     let truncation = Truncation::of(config, &setup);
-    warnings.extend(truncation.as_ref().and_then(Truncation::sent_back));
+    let sent_back = truncation.as_ref().and_then(Truncation::sent_back);
+    let warnings = setup.warnings.iter().cloned().chain(advice(config, &setup)).chain(sent_back).collect();
     Ok(Summary {
         title: &config.title,
         mesh_origin: config.mesh.generator().map_or("file", Generator::name),

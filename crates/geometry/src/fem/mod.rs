@@ -2,11 +2,12 @@
 //!
 //! Lives here: equation numbers ([`dofs`]), the sparsity pattern from topology and couplings alone ([`pattern`]),
 //! parallel assembly into it ([`assemble`]), the assembled matrix ([`csr`]), fill-reducing orderings ([`ordering`],
-//! [`lifted_ordering`] of functions on edges, `kept_first` where part of a factor is kept), the factor of real and
-//! complex symmetric systems ([`ldlt`]), the one without fill ([`incomplete`]), what factors take beside themselves ([`workspace`]) and, for elastic systems too large for a factor, conjugate gradients
-//! ([`conjugate_gradients`](mod@conjugate_gradients)) with a factor per component ([`components`]). Does not live here:
-//! any weak form, any material, any boundary condition. A *node* is a finite-element node: a vertex for linear elements; elements of higher order number
-//! further nodes on their edges and use the same code with longer connectivity rows.
+//! [`lifted_ordering`] of functions on edges, `kept_first` where part of a factor is kept), the factor of real and complex
+//! symmetric systems ([`ldlt`]), the one without fill ([`incomplete`]), what factors take beside themselves ([`workspace`]) and,
+//! for elastic systems too large for a factor, conjugate gradients ([`conjugate_gradients`](mod@conjugate_gradients)) with a
+//! factor per component ([`components`]). Does not live here:
+//! any weak form, any material, any boundary condition. A *node* is a finite-element node: a vertex for linear elements;
+//! elements of higher order number further nodes on their edges and use the same code with longer connectivity rows.
 
 pub mod assemble;
 pub mod components;

@@ -26,6 +26,7 @@ use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 pub use filter::{cell_size, default_filter_radius};
 pub use grid::{GridSide, dominant_axis};
+pub(crate) use normal::faces_around;
 pub use symmetry::edges_without_image;
 pub use transfer::{SurfaceMismatch, Triangulation};
 

@@ -72,7 +72,7 @@ fn step(triangles: &[([NodeId; 3], Point)], planes: &[Point]) -> (Point, f64) {
     let area: f64 = triangles.iter().map(|(_, area)| norm(*area)).sum();
     let length = norm(within);
     if length > SHORTEST * area {
-        let faces = faces(triangles);
+        let faces = normals(triangles);
         if !is_sharp(&faces, planes) {
             return (within.map(|c| c / length), 1.0);
         }
@@ -85,25 +85,29 @@ fn step(triangles: &[([NodeId; 3], Point)], planes: &[Point]) -> (Point, f64) {
     ([0.0; 3], 1.0)
 }
 
-/// Unit normals of the faces that triangles around a node form: over an edge, one goes on in the other where they turn little.
-fn faces(triangles: &[([NodeId; 3], Point)]) -> Vec<Point> {
-    let triangles: Vec<_> = triangles.iter().filter(|(_, area)| norm(*area) > 0.0).collect();
-    let mut sets = DisjointSets::new(triangles.len());
-    for (i, (nodes, area)) in triangles.iter().enumerate() {
-        for (j, (others, other)) in triangles[..i].iter().enumerate() {
+/// The faces that triangles around a node form, each by the places of its triangles: over an edge, one goes on in the other where they
+/// turn little. Triangles without area are in none.
+pub(crate) fn faces_around(triangles: &[([NodeId; 3], Point)]) -> Vec<Vec<usize>> {
+    let places: Vec<usize> = (0..triangles.len()).filter(|&i| norm(triangles[i].1) > 0.0).collect();
+    let mut sets = DisjointSets::new(places.len());
+    for (i, (nodes, area)) in places.iter().map(|&i| &triangles[i]).enumerate() {
+        for (j, (others, other)) in places[..i].iter().map(|&j| &triangles[j]).enumerate() {
             let share_an_edge = nodes.iter().filter(|n| others.contains(n)).count() > 1;
             if share_an_edge && dot(unit(*area), unit(*other)) > SMOOTH {
                 sets.join([i, j]);
             }
         }
     }
-    let roots: Vec<usize> = (0..triangles.len()).map(|i| sets.root(i)).collect();
-    let of = |root: usize| {
-        let own = triangles.iter().zip(&roots).filter(|(_, own)| **own == root);
-        sum(own.map(|((_, area), _)| *area))
-    };
-    let first = (0..triangles.len()).filter(|&i| roots[i] == i);
-    first.map(of).filter(|area| norm(*area) > 0.0).map(unit).collect()
+    let roots: Vec<usize> = (0..places.len()).map(|i| sets.root(i)).collect();
+    let of = |root: usize| (0..places.len()).filter(|&i| roots[i] == root).map(|i| places[i]).collect();
+    (0..places.len()).filter(|&i| roots[i] == i).map(of).collect()
+}
+
+/// Their unit normals.
+fn normals(triangles: &[([NodeId; 3], Point)]) -> Vec<Point> {
+    let area = |own: Vec<usize>| sum(own.into_iter().map(|i| triangles[i].1));
+    let areas = faces_around(triangles).into_iter().map(area);
+    areas.filter(|area| norm(*area) > 0.0).map(unit).collect()
 }
 
 /// Whether two faces meet in a sharp edge, or one and its mirror image in a plane.

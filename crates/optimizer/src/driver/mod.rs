@@ -13,8 +13,9 @@
 //!   convergence.
 //! * Where the method ends and no design keeps all constraints, the worst of them is minimised until one does; then the method goes
 //!   on from there. Where none does the run ends with the least violation.
-//! * Where the method ends, or one evaluation is left, and a far better design than the best one is beyond a bound by little, it is
-//!   evaluated a step back within its bounds (`near_miss`).
+//! * Where a search asks for the best design once more, to rounding, it has come to its end.
+//! * Where the method ends, one evaluation is left, or the supervisor looks after the next one, and a far better design than the
+//!   best one is beyond a bound by little, it is evaluated a step back within its bounds (`near_miss`).
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.

@@ -1,9 +1,10 @@
 //! Designs that are beyond a bound by little, and the step back within it.
 //!
 //! Methods end on a bound from either side. The little by which one is beyond it may be more than counts as kept, and all that
-//! the method has found would count for nothing: where a method ends so, or one evaluation is left, the best of these designs is
-//! evaluated once more, a step back within its bounds. That is an evaluation as others, so that a replay comes to it by itself;
-//! where the limit of evaluations asked for it, which a resumed run may have raised, its record says so.
+//! the method has found would count for nothing: where a method ends so, one evaluation is left, or the search is looked at after
+//! the next one, the best of these designs is evaluated once more, a step back within its bounds. That is an evaluation as others,
+//! so that a replay comes to it by itself; where the limit of evaluations asked for it, which a resumed run may have raised, or the
+//! look at the search, its record says so.
 
 use super::carry::Carriage;
 use super::run::Run;
@@ -131,14 +132,16 @@ impl Run<'_> {
         self.greatest_miss(|_| true).map(|k| &self.near_misses[k])
     }
 
-    /// The one that gains most of those whose step back has not been tried.
-    fn untried(&self) -> Option<usize> {
-        self.greatest_miss(|miss| !miss.has_been_tried)
+    /// The one that gains most of those whose step back has not been tried, nor is one of these evaluations.
+    fn untried(&self, but: &[usize]) -> Option<usize> {
+        self.greatest_miss(|miss| !miss.has_been_tried && !but.contains(&miss.evaluation))
     }
 
-    /// The next step back that the mesh carries, with the number of its miss. What it does not carry is not tried again.
+    /// The next step back that the mesh carries, with the number of its miss. To look ahead for one changes nothing, as a replay does
+    /// not.
     pub(super) fn next_step_back(&mut self) -> Result<Option<(usize, Carriage)>, Stop> {
-        while let Some(k) = self.untried() {
+        let mut refused = Vec::new();
+        while let Some(k) = self.untried(&refused) {
             if let Some(design) = self.near_misses[k].stepped_back.clone() {
                 match self.carry(&design) {
                     Ok(carried) if !carried.is_cut() => return Ok(Some((k, carried))),
@@ -146,7 +149,7 @@ impl Run<'_> {
                     Err(other) => return Err(other),
                 }
             }
-            self.near_misses[k].has_been_tried = true;
+            refused.push(self.near_misses[k].evaluation);
         }
         Ok(None)
     }
@@ -167,7 +170,7 @@ impl Run<'_> {
                 | StopReason::MethodStalled
                 | StopReason::MeshLimited
         );
-        if !(is_of_method || is_limit) || self.untried().is_none() {
+        if !(is_of_method || is_limit) || self.untried(&[]).is_none() {
             return Ok(Some(reason));
         }
         if !self.is_replaying() {
@@ -190,7 +193,7 @@ impl Run<'_> {
                 Ok(Some(reason))
             }
             Err(Stop::Error(error)) => Err(*error),
-            Err(Stop::Mesh(_) | Stop::CutShort | Stop::Astray | Stop::Standing) => Ok(Some(reason)),
+            Err(Stop::Mesh(_) | Stop::CutShort | Stop::Astray | Stop::Stagnant) => Ok(Some(reason)),
         }
     }
 

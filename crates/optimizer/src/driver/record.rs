@@ -14,7 +14,8 @@ pub struct Record {
     pub row: Evaluation,
     /// Whether it was the best until then.
     pub improved: bool,
-    /// Where no method asked for it, but it is a step back within the bounds: why the search before it ended.
+    /// Where no method asked for it, but it is a step back within the bounds: why the search before it ended, or the limit of
+    /// evaluations where it came before a supervisor looked at the search.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stepped_back: Option<StopReason>,
     /// The design variables [m].

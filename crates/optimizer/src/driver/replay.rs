@@ -32,7 +32,7 @@ impl Run<'_> {
         was.iter().zip(is).position(is_other)
     }
 
-    /// Ends a search where the run had come to its last evaluation, which a step back took: now there may be more of them.
+    /// Ends a search where the run had come to its last evaluation, or to the last before a look at the search, which a step back took.
     pub(super) fn check_replay(&self) -> Result<(), Stop> {
         let stepped_back = self.next.as_ref().and_then(|record| record.stepped_back);
         let limit = stepped_back.filter(|&reason| reason == StopReason::MaxEvaluations);

@@ -180,6 +180,11 @@ impl<'a> Run<'a> {
         self.best.as_ref().map(|best| (best.violation, best.sample.value))
     }
 
+    /// The best design, and its value as the method sees it.
+    pub(super) fn incumbent_design(&self) -> Option<(Vec<f64>, f64)> {
+        self.best.as_ref().map(|best| (best.values.clone(), best.sample.value))
+    }
+
     /// Whether there are designs, and none keeps all constraints.
     pub(super) fn violates(&self) -> bool {
         self.best.as_ref().is_some_and(|best| best.violation > 0.0)

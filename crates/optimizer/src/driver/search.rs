@@ -20,12 +20,10 @@ const MOST_ASTRAY: usize = 15;
 /// Share of the violation that so many must take away.
 const MENDED: f64 = 0.1;
 
-/// Share of the range of every variable, and of `ftol_rel`, within which a design and its value are those of another one; and how many
-/// such designs in a row end a search. At an optimum on its bounds rounding keeps `mma` and `ccsaq` from believing their model, which
-/// they make steeper and steeper, and `ftol_rel` is not asked meanwhile.
-const STANDING: f64 = 1e-6;
-const STANDING_VALUE: f64 = 0.01;
-const MOST_STANDING: usize = 4;
+/// Share of the range of every variable, and of `ftol_rel` for the value, within which an evaluation has led nowhere from the best design.
+/// At an optimum on its bounds rounding keeps `mma` and `ccsaq` from believing their models, which they make steeper and steeper, and
+/// `ftol_rel` is not asked meanwhile: up to sixteen evaluations went to one design.
+const STAGNANT: [f64; 2] = [1e-6, 0.01];
 
 /// How often the trust region may shrink without a gain: to an eighth.
 const MAX_SHRINKS: usize = 3;
@@ -55,30 +53,6 @@ pub(super) struct Ended {
     /// Whether it improved on the best design before it.
     gained: bool,
     evaluations: usize,
-}
-
-/// Where a search stands still.
-#[derive(Default)]
-struct Stand {
-    design: Vec<f64>,
-    value: f64,
-    count: usize,
-}
-
-impl Stand {
-    /// How many designs in a row are this one, whose values differ by no more than a share.
-    fn count(&mut self, (design, value): (&[f64], f64), [lower, upper]: &[Vec<f64>; 2], share: f64) -> usize {
-        let is_near = |k: usize| (design[k] - self.design[k]).abs() <= STANDING * (upper[k] - lower[k]);
-        let is_same = self.count > 0
-            && (value - self.value).abs() <= share * value.abs()
-            && (0..design.len()).all(is_near);
-        if is_same {
-            self.count += 1;
-        } else {
-            *self = Self { design: design.to_vec(), value, count: 1 };
-        }
-        self.count
-    }
 }
 
 /// What follows from a search.
@@ -149,12 +123,11 @@ impl<'a> Search<'a> {
         };
         let before = (run.evaluations(), run.incumbent_values());
         let (may_stray, mut mended) = (self.is_restoring, before);
-        let mut stand = Stand::default();
-        let value_share = STANDING_VALUE * self.ftol_rel;
         let outcome = minimise(&minimisation, &run.centre(), |p| {
+            let from = (run.evaluations(), run.incumbent_design());
             let mut sample = run.evaluate(p)?;
-            if stand.count((p, sample.value), &bounds, value_share) > MOST_STANDING {
-                return Err(Stop::Standing);
+            if run.is_stagnant(from, &sample, (&bounds, self.ftol_rel)) {
+                return Err(Stop::Stagnant);
             }
             if run.has_gained(mended, MENDED) {
                 mended = (run.evaluations(), run.incumbent_values());
@@ -194,8 +167,10 @@ impl<'a> Search<'a> {
             }
             Outcome::Failed(cause) => Err(Error::Optimisation { cause }),
             Outcome::Interrupted(Stop::CutShort) => Ok(NextStep::SearchOn),
-            Outcome::Interrupted(Stop::Standing) => {
-                Ok(self.after_ending(run, Ending::Objective, gained, evaluations))
+            Outcome::Interrupted(Stop::Stagnant) => {
+                let is_on = self.ftol_rel > 0.0;
+                let ending = if is_on { Ending::Objective } else { Ending::Roundoff };
+                Ok(self.after_ending(run, ending, gained, evaluations))
             }
             Outcome::Interrupted(Stop::Astray) => Ok(NextStep::Restore),
             Outcome::Interrupted(Stop::Limit(reason)) => Ok(NextStep::Stop(reason)),
@@ -331,26 +306,18 @@ fn with_violation_as_objective(mut sample: Sample, of_problem: usize) -> Sample 
     Sample { value, gradient, members, ..sample }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_search_stands_where_neither_its_designs_nor_their_values_move() {
-        let bounds = [vec![0.0; 2], vec![1.0, 1e-3]];
-        let mut stand = Stand::default();
-        let mut count = |x: f64, y: f64, value: f64| stand.count((&[x, y], value), &bounds, 1e-5);
-        assert_eq!(
-            [count(0.5, 5e-4, 2.0), count(0.5 + 9e-7, 5e-4, 2.00001), count(0.5, 5e-4, 2.0)],
-            [1, 2, 3]
-        );
-        // A variable with less room, and the value of a design that has not moved.
-        assert_eq!(
-            [count(0.5, 5.02e-4, 2.0), count(0.5, 5.02e-4, 2.0), count(0.5, 5.02e-4, 2.001)],
-            [1, 2, 1]
-        );
-        // It is the first of them that the others are held against: what creeps gets away.
-        let crept = [0.5, 0.500_000_7, 0.500_001_4, 0.500_002_1].map(|x| count(x, 1e-4, 2.001));
-        assert_eq!(crept, [1, 2, 1, 2]);
+impl Run<'_> {
+    /// Whether an evaluation has led nowhere from what was the best design with its value before, after so many evaluations.
+    fn is_stagnant(
+        &self,
+        (evaluations, best): (usize, Option<(Vec<f64>, f64)>),
+        sample: &Sample,
+        ([lower, upper], ftol_rel): (&[Vec<f64>; 2], f64),
+    ) -> bool {
+        let Some((design, value)) = best.filter(|_| self.evaluations() > evaluations) else { return false };
+        let [range_share, value_share] = STAGNANT;
+        (sample.value - value).abs() <= value_share * ftol_rel * value.abs()
+            && (0..design.len())
+                .all(|k| (self.last[k] - design[k]).abs() <= range_share * (upper[k] - lower[k]))
     }
 }

@@ -53,7 +53,7 @@ impl Run<'_> {
     /// The limit that an evaluation runs into, if it does.
     fn evaluated(&mut self, p: &[f64]) -> Result<Option<StopReason>, Error> {
         match self.evaluate(p) {
-            Ok(_) | Err(Stop::CutShort | Stop::Astray | Stop::Standing) => Ok(None),
+            Ok(_) | Err(Stop::CutShort | Stop::Astray | Stop::Stagnant) => Ok(None),
             Err(Stop::Limit(reason)) => Ok(Some(reason)),
             Err(Stop::Mesh(_)) if self.has_best() => Ok(None),
             Err(Stop::Mesh(Refusal { cause })) => Err(Error::FirstDesign { cause }),

@@ -13,8 +13,8 @@ pub(super) enum Stop {
     CutShort,
     /// Constraints are not kept, and many designs have not come nearer to that.
     Astray,
-    /// Many designs in a row are one, to rounding.
-    Standing,
+    /// An evaluation has led nowhere from the best design.
+    Stagnant,
     Error(Box<Error>),
 }
 

@@ -1,4 +1,4 @@
-//! Least and greatest thickness along the design's direction, as one smooth constraint.
+//! Least and greatest thickness along the design's direction, at edges across their faces, as one smooth constraint.
 //!
 //! A limit on the thickness at every design node is as many constraints as the surface has nodes. MMA and SLSQP carry dense
 //! arrays of that number times the number of variables and solve a dual problem in it. So the limits are gathered in the

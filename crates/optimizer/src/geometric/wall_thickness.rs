@@ -1,4 +1,5 @@
-//! Wall thickness of the designed bodies, measured along the direction of motion behind every design node, and before every node of
+//! Wall thickness of the designed bodies, measured along the direction of motion behind every design node (at an edge of designed faces
+//! along their normals), and before every node of
 //! the faces opposite where these are no planes.
 //!
 //! From each node `x` of the design surface a ray runs against its direction `d` to where it leaves the body. On the
@@ -13,7 +14,8 @@
 //!
 //! At an edge where designed faces meet the direction leans to all of them, and a ray against it says nothing of the lip that they make
 //! with the faces opposite: there one ray runs behind each of these faces, against its own normal, from a place in it a thousandth of
-//! the way from the node to its middle; `d` is the normal. Where the faces meet at an acute angle they are each other's opposite, of no
+//! the way from the node to its middle; `d` is the normal. The ray against the direction counts where it says less, as at the bottom of
+//! a groove. Where the faces meet at an acute angle they are each other's opposite, of no
 //! thickness at the edge: then it is the ray against the direction again.
 //!
 //! Between two design nodes the body may be thinner than behind both: before a step, a rib or a kink of the face opposite. So a ray runs
@@ -31,7 +33,7 @@ use fluxmorph_geometry::topology::Facet;
 use fluxmorph_geometry::{ElementId, Mesh, NodeId, RegionId};
 
 use super::NoThickness;
-use crate::design::DesignSurface;
+use crate::design::{DesignSurface, faces_around};
 
 /// Sine of the angle (six degrees) between ray and triangle below which the triangle belongs to the body's side: facets of a
 /// round side lean by less, and an opposite face as steep as that makes no body whose thickness means anything.
@@ -39,9 +41,6 @@ const GRAZING: f64 = 0.1;
 
 /// Share of a distance by which it may differ from what those around it say by rounding.
 const ROUNDING: f64 = 1e-6;
-
-/// Cosine of the angle (thirty degrees) between normals of one face, beyond which there are two that meet in an edge.
-const ONE_FACE: f64 = 0.866;
 
 /// Share of the way from a node at an edge to the middle of a face beside it at which the ray behind that face begins.
 const INSET: f64 = 1e-3;
@@ -136,22 +135,23 @@ impl WallThickness {
                 });
             }
         }
-        let opposite_of = |(&node, direction): (&NodeId, &Point)| {
+        let opposite_of = |((&node, direction), &mitre): ((&NodeId, &Point), &f64)| {
             if *direction == [0.0; 3] {
                 return Ok(Vec::new());
             }
             let (origin, back) = (mesh.point(node), direction.map(|d| -d));
             let in_body = |body: RegionId| {
                 let faces = &of[&body];
-                let at_edge = faces.behind_edge(node, (origin, *direction));
-                if !at_edge.is_empty() {
-                    return at_edge;
-                }
+                let is_edge = mitre != 1.0;
+                let mut found =
+                    if is_edge { faces.behind_edge(node, (origin, *direction)) } else { Vec::new() };
+                let least = found.iter().map(|(_, own)| own.distance).fold(f64::INFINITY, f64::min);
                 // Along the facets of a side that is round a ray from the rim meets one of them anywhere.
                 let grazing = || faces.grazed(origin, back).filter(|_| !faces.are_at_rim(node));
-                let found = faces.opposite(origin, back).or_else(grazing);
-                let measured = |(hit, nodes)| Opposite::new(node, &hit, *direction, (nodes, body));
-                found.map(|found| (*direction, measured(found))).into_iter().collect::<Vec<_>>()
+                let along = faces.opposite(origin, back).or_else(grazing);
+                let along = along.map(|(hit, nodes)| Opposite::new(node, &hit, *direction, (nodes, body)));
+                found.extend(along.filter(|own| own.distance < least).map(|own| (*direction, own)));
+                found
             };
             // A node with no body behind it moves along a side of one, or of the only one there is.
             let beside = of.iter().filter(|(_, faces)| bodies.len() == 1 || faces.are_designed_at(node));
@@ -168,7 +168,7 @@ impl WallThickness {
             let at = (!of.is_empty()).then_some(origin);
             if is_whole { Ok(found) } else { Err(NoThickness { at }) }
         };
-        let nodes = surface.nodes().iter().zip(surface.directions());
+        let nodes = surface.nodes().iter().zip(surface.directions()).zip(surface.mitres());
         let by_node = nodes.map(opposite_of).collect::<Result<Vec<_>, _>>()?;
         let facing: Vec<_> = of.values().flat_map(|own| own.facing(mesh, surface, &by_node)).collect();
         let with_place =
@@ -198,9 +198,10 @@ impl WallThickness {
         self.opposite.iter().map(|(i, opposite)| (*i, opposite.distance))
     }
 
-    /// The triangles opposite of all design nodes, of the mesh that was measured.
-    pub fn opposite_faces(&self) -> impl Iterator<Item = [NodeId; 3]> + '_ {
-        self.opposite.iter().filter(|(_, own)| own.bulge.is_none()).map(|(_, own)| own.face)
+    /// The triangles opposite of all design nodes, of the mesh that was measured, with the places of these in the design surface,
+    /// ascending.
+    pub fn opposite_faces(&self) -> impl Iterator<Item = (usize, [NodeId; 3])> + '_ {
+        self.opposite.iter().filter(|(_, own)| own.bulge.is_none()).map(|(place, own)| (*place, own.face))
     }
 
     /// The nodes opposite of the design surface, some of them several times.
@@ -307,15 +308,16 @@ struct BodyFaces {
     /// The nodes of those that are part of the design surface, and of the others.
     designed_nodes: HashSet<NodeId>,
     other_nodes: HashSet<NodeId>,
+    /// By face: whether all of its nodes are of the design surface.
     is_designed: Vec<bool>,
 }
 
 impl BodyFaces {
     fn new(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Self {
         let nodes = mesh.topology().boundary(region);
-        let is_designed = |face: &&[NodeId; 3]| face.iter().all(|n| surface.nodes().binary_search(n).is_ok());
-        let flags = nodes.iter().map(|face| is_designed(&face)).collect();
-        let (designed, others): (Vec<_>, Vec<_>) = nodes.iter().partition(is_designed);
+        let of_design = |face: &&[NodeId; 3]| face.iter().all(|n| surface.nodes().binary_search(n).is_ok());
+        let is_designed: Vec<bool> = nodes.iter().map(|face| of_design(&face)).collect();
+        let (designed, others): (Vec<_>, Vec<_>) = nodes.iter().partition(of_design);
         let [designed_nodes, other_nodes] =
             [designed, others].map(|faces: Vec<&[NodeId; 3]>| faces.into_iter().flatten().copied().collect());
         let corners: Vec<[Point; 3]> = nodes.iter().map(|f| f.map(|n| mesh.point(n))).collect();
@@ -324,38 +326,28 @@ impl BodyFaces {
         for (i, face) in nodes.iter().enumerate() {
             face.iter().for_each(|&n| at_node.entry(n).or_default().push(i));
         }
-        Self { body: region, nodes, corners, at_node, tree, designed_nodes, other_nodes, is_designed: flags }
+        Self { body: region, nodes, corners, at_node, tree, designed_nodes, other_nodes, is_designed }
     }
 
-    /// What lies opposite of a node behind each of the designed faces that meet in an edge there, by the normal of that face; none where
-    /// it is one face, but for those that run along the node's direction.
+    /// What lies opposite of a node at an edge behind each of the designed faces that meet there, by the normal of that face; none of
+    /// those that run along the node's direction.
     fn behind_edge(&self, node: NodeId, (origin, direction): (Point, Point)) -> Vec<(Point, Opposite)> {
-        let mut parts: Vec<(Point, Vec<usize>)> = Vec::new();
-        for &face in self.at_node.get(&node).into_iter().flatten().filter(|&&face| self.is_designed[face]) {
-            let normal = unit(area_vector(self.corners[face]));
-            if dot(normal, direction) < GRAZING {
-                continue;
-            }
-            match parts.iter_mut().find(|(first, _)| dot(*first, normal) > ONE_FACE) {
-                Some((_, faces)) => faces.push(face),
-                None => parts.push((normal, vec![face])),
-            }
-        }
-        if parts.len() < 2 {
-            return Vec::new();
-        }
-        let behind = |(_, faces): (Point, Vec<usize>)| {
-            let corners = || faces.iter().map(|&face| &self.corners[face]);
-            let normal = unit(corners().map(|own| area_vector(*own)).fold([0.0; 3], add));
-            let middle =
-                corners().map(|own| centroid(*own)).fold([0.0; 3], add).map(|x| x / faces.len() as f64);
+        let at_node = self.at_node.get(&node).into_iter().flatten().copied();
+        let faces: Vec<usize> = at_node.filter(|&face| self.is_designed[face]).collect();
+        let around: Vec<_> =
+            faces.iter().map(|&face| (self.nodes[face], area_vector(self.corners[face]))).collect();
+        let behind = |part: Vec<usize>| {
+            let normal = unit(part.iter().map(|&i| around[i].1).fold([0.0; 3], add));
+            let centres = part.iter().map(|&i| centroid(self.corners[faces[i]]));
+            let middle = centres.fold([0.0; 3], add).map(|x| x / part.len() as f64);
             let beside = add(origin, sub(middle, origin).map(|x| INSET * x));
+            (dot(normal, direction) >= GRAZING).then_some(())?;
             let (hit, nodes) = self.opposite(beside, normal.map(|c| -c))?;
             let found = Opposite::new(node, &hit, normal, (nodes, self.body));
             let distance = found.distance + dot(found.growth, sub(origin, beside));
             (!nodes.contains(&node)).then_some((normal, Opposite { distance, ..found }))
         };
-        parts.into_iter().filter_map(behind).collect()
+        faces_around(&around).into_iter().filter_map(behind).collect()
     }
 
     /// The body before every node of the faces that the design surface does not have, where that says more than what lies behind the

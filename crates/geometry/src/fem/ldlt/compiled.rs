@@ -79,8 +79,8 @@ impl<T: FactorScalar> Ldlt<T> {
         Self::new(analysis, entry)?.of_positive_definite()
     }
 
-    /// As [`Ldlt::new`] with panels that another factor of this analysis left, wherever the matrix is as it was in all that they come from:
-    /// the bits are those of [`Ldlt::new`].
+    /// As [`Ldlt::new`] with panels that another factor of this analysis left, wherever the matrix is as it was in all that they
+    /// come from: the bits are those of [`Ldlt::new`].
     ///
     /// # Errors
     /// As [`Ldlt::new`].

@@ -142,7 +142,7 @@ fn what_lies_opposite_and_is_not_solved_on_stays_where_it_is() {
     }
     assert_eq!(thickness.walls(lower).count(), surface.nodes().len());
     assert_eq!(thickness.opposite_nodes().count(), 0);
-    assert!(thickness.opposite_faces().flatten().all(is_opposite));
+    assert!(thickness.opposite_faces().flat_map(|(_, face)| face).all(is_opposite));
 }
 
 /// Plates side by side under one face: a node of both has the thickness of each.
@@ -305,6 +305,34 @@ fn a_lip_at_an_edge_of_designed_faces_is_measured_across() {
         let expected = if is_at_rim(at) { 0.15 } else { 0.25 };
         // Rays begin a thousandth of a facet beside the rim, where the face opposite is as much nearer to what it was.
         assert!((thickness - expected).abs() < 2e-4, "{at:?}: {thickness} {expected}");
+    }
+}
+
+/// Both faces are designed, so that nothing is measured from opposite.
+#[test]
+fn a_groove_in_a_designed_face_is_as_deep_as_it_is() {
+    let mesh = layers(&[("slab", [0.5, 1.0])]);
+    let is_bottom_of_groove = |x: Point| x[0] == 0.5 && x[2] == 1.0;
+    let grooved = |n: NodeId| if is_bottom_of_groove(mesh.point(n)) { [0.0, 0.0, -0.3] } else { [0.0; 3] };
+    let lowered: Vec<Point> = mesh.topology().nodes().map(grooved).collect();
+    let grooved = mesh.moved(&lowered).expect("no element is inverted");
+    let slab = mesh.topology().region("slab").expect("it has one");
+    // Chosen on the flat one: the sides of the groove look up as well.
+    let triangles: Vec<[NodeId; 3]> = mesh
+        .topology()
+        .boundary(slab)
+        .into_iter()
+        .filter(|face| [0.5, 1.0].iter().any(|z| face.iter().all(|n| mesh.point(*n)[2] == *z)))
+        .collect();
+    let surface = DesignSurface::new(&grooved, &DesignSetup::new(&triangles, Direction::Normal))
+        .expect("every node is a variable");
+    let at_groove = |place: usize| is_bottom_of_groove(mesh.point(surface.nodes()[place]));
+    assert!((0..surface.nodes().len()).any(|place| at_groove(place) && surface.mitres()[place] != 1.0));
+    let thickness = WallThickness::measure(&grooved, &[slab], &surface).expect("it has two faces");
+    for (place, least) in thickness.least_at_nodes(|n| grooved.point(n)) {
+        if at_groove(place) {
+            assert!((least - 0.2).abs() < 1e-12, "{least}");
+        }
     }
 }
 
