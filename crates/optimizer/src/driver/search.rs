@@ -170,7 +170,8 @@ impl<'a> Search<'a> {
             Outcome::Interrupted(Stop::Stagnant) => {
                 let is_on = self.ftol_rel > 0.0;
                 let ending = if is_on { Ending::Objective } else { Ending::Roundoff };
-                Ok(self.after_ending(run, ending, gained, evaluations))
+                // That is no cautious first step.
+                Ok(self.after_ending(run, ending, gained, evaluations.max(CAUTIOUS + 1)))
             }
             Outcome::Interrupted(Stop::Astray) => Ok(NextStep::Restore),
             Outcome::Interrupted(Stop::Limit(reason)) => Ok(NextStep::Stop(reason)),
