@@ -8,25 +8,27 @@ use crate::config::{self, Coil, CoilShape, Config};
 /// skin audit and the field have that of the curve.
 const OF_A_CURVE: f64 = 1000.0;
 
+/// What the configuration says of the material of a region.
+fn entry<'a>(config: &'a Config, region: &str) -> Option<&'a config::Material> {
+    config.regions.get(region).and_then(|region| config.materials.get(&region.material))
+}
+
+/// Whether [`OF_A_CURVE`] stands for the permeability of a material.
+fn is_of_curve(own: &config::Material) -> bool {
+    own.saturates() && (own.saturation.is_none() || own.relative_permeability > OF_A_CURVE)
+}
+
 /// The material of a region; air where the configuration says nothing.
 pub(crate) fn material(config: &Config, region: &str) -> Material {
-    let entry = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
-    let permeability = |m: &config::Material| match m.saturation {
-        Some(_) => m.relative_permeability.min(OF_A_CURVE),
-        None if m.saturates() => OF_A_CURVE,
-        None => m.relative_permeability,
-    };
-    entry.map_or(Material::AIR, |m| Material {
-        relative_permeability: permeability(m),
+    entry(config, region).map_or(Material::AIR, |m| Material {
+        relative_permeability: if is_of_curve(m) { OF_A_CURVE } else { m.relative_permeability },
         conductivity: m.conductivity,
     })
 }
 
 /// Whether a region is iron with a B–H curve, whose permeability here stands for that of the curve.
 pub(crate) fn has_curve(config: &Config, region: &str) -> bool {
-    let material = config.regions.get(region).and_then(|region| config.materials.get(&region.material));
-    material
-        .is_some_and(|m| m.saturates() && (m.saturation.is_none() || m.relative_permeability > OF_A_CURVE))
+    entry(config, region).is_some_and(is_of_curve)
 }
 
 /// Whether a region is a permanent magnet.

@@ -104,7 +104,7 @@ fn outline_design(
     if bodies.is_empty() {
         bodies = regions_at(full_mesh, surface.nodes()).into_iter().filter(has_entry).collect();
     }
-    let is_designed = |facet: &&Facet| facet.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok());
+    let is_designed = |facet: &&Facet| surface.has_all(&facet.nodes);
     let beside = topology.facets().iter().filter(is_designed);
     let beside = beside.flat_map(|facet| [Some(facet.inside), facet.outside]).flatten();
     let beside: BTreeSet<RegionId> = beside.map(|e| topology.region_of()[e.index()]).collect();

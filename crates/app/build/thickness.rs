@@ -1,6 +1,6 @@
 //! Bodies whose wall thickness is not that of the device.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::topology::face_key;
@@ -34,14 +34,7 @@ pub(super) fn cut_warning(config: &Config, shape: Option<&Shape>, full_mesh: &Me
         "`{}`: the thickness behind {} of {} design nodes ends at {at}, at the outside of the mesh, and is that of the meshed part; where \
          that is a plane of symmetry, halve the bound",
         constraint.name,
-        nodes_of(cut.iter().map(|(place, _)| *place)),
-        nodes_of(opposite.iter().map(|(place, _)| *place))
+        cut.iter().map(|(place, _)| place).collect::<BTreeSet<_>>().len(),
+        opposite.iter().map(|(place, _)| place).collect::<BTreeSet<_>>().len()
     ))
-}
-
-/// How many places there are, which ascend.
-fn nodes_of(places: impl Iterator<Item = usize>) -> usize {
-    let mut places: Vec<usize> = places.collect();
-    places.dedup();
-    places.len()
 }

@@ -14,12 +14,15 @@ use crate::error::RemeshError;
 /// Elements that one task looks at: within it, what cannot come before the first inversion so far is passed over.
 const CHUNK: usize = 1024;
 
+/// Share of the step to the first inversion within which elements invert together: those that symmetry makes alike differ by rounding.
+const TOGETHER: f64 = 1e-9;
+
 /// The first inversion along a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepToInversion {
     /// Multiple of the motion at which the first volume vanishes; infinite if none ever does.
     pub step: f64,
-    /// The element whose volume vanishes there; of several, the first.
+    /// The element whose volume vanishes there; of several, which may differ by rounding, the first.
     pub element: Option<ElementId>,
 }
 
@@ -34,28 +37,26 @@ impl StepToInversion {
 ///
 /// # Panics
 /// If there is not one displacement per node.
-#[expect(
-    clippy::disallowed_methods,
-    reason = "the least of steps and numbers of elements, no two alike, has no order"
-)]
+#[expect(clippy::disallowed_methods, reason = "the least of numbers has no order")]
 pub fn step_to_inversion(mesh: &Mesh, displacement: &[Point]) -> StepToInversion {
     assert_eq!(displacement.len(), mesh.points().len(), "one displacement per node");
-    let never = (f64::INFINITY, None);
-    let earlier = |a: (f64, Option<ElementId>), b: (f64, Option<ElementId>)| {
-        if (b.0, b.1.is_none(), b.1) < (a.0, a.1.is_none(), a.1) { b } else { a }
+    let tets = mesh.topology().tets();
+    let root = |e: usize, known: f64| {
+        first_root(mesh.vertices(ElementId::new(e)), tets[e].map(|n| displacement[n.index()]), known)
     };
-    let chunks = mesh.topology().tets().par_chunks(CHUNK).enumerate().map(|(chunk, tets)| {
-        tets.iter().enumerate().fold(never, |first, (i, tet)| {
-            let element = ElementId::new(chunk * CHUNK + i);
-            let moved = tet.map(|n| displacement[n.index()]);
-            match first_root(mesh.vertices(element), moved, first.0) {
-                Some(step) => earlier(first, (step, step.is_finite().then_some(element))),
-                None => first,
-            }
-        })
-    });
-    let (step, element) = chunks.reduce(|| never, earlier);
-    StepToInversion { step, element }
+    let least = |chunk: usize| {
+        let elements = chunk * CHUNK..tets.len().min((chunk + 1) * CHUNK);
+        elements.fold(f64::INFINITY, |least, e| root(e, least).map_or(least, |step| least.min(step)))
+    };
+    let chunks = (0..tets.len().div_ceil(CHUNK)).into_par_iter();
+    let step = chunks.map(least).reduce(|| f64::INFINITY, f64::min);
+    if step == f64::INFINITY {
+        return StepToInversion::NEVER;
+    }
+    let last = step * (1.0 + TOGETHER);
+    let inverts = |e: &usize| root(*e, last).is_some_and(|own| own <= last);
+    let element = (0..tets.len()).into_par_iter().with_min_len(CHUNK).find_first(inverts);
+    StepToInversion { step, element: element.map(ElementId::new) }
 }
 
 /// The mesh moved by `displacement` [m], shape `(n_nodes, 3)`, unless that inverts an element.

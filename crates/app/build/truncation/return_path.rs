@@ -11,8 +11,7 @@ use fluxmorph_solver::{Boundary, FieldModel, SurfaceLaw};
 use super::{Side, Standing};
 
 /// Two planes that coils or matter reach and flux passes, where no flux passes what joins them: those at the ends of a slice, or of a
-/// sector that leaves out its axis. Planes that meet have an edge along which nothing holds `A`.
-/// Parts of one plane are not two.
+/// sector that leaves out its axis. Planes that meet have an edge along which nothing holds `A`; parts of one plane are not two.
 pub(super) fn confined<'s>(
     sides: &'s [Side],
     (model, mesh): (&FieldModel, &Mesh),

@@ -322,6 +322,11 @@ impl DesignSurface {
         &self.points
     }
 
+    /// Whether all nodes of a triangle are of the surface.
+    pub fn has_all(&self, triangle: &[NodeId; 3]) -> bool {
+        triangle.iter().all(|node| self.nodes.binary_search(node).is_ok())
+    }
+
     /// How far every node goes along its direction where its surface moves by one: more than one on a sharp edge, whose faces move.
     pub fn mitres(&self) -> &[f64] {
         &self.mitres

@@ -16,6 +16,11 @@ use crate::problem::{Problem, Shape, SolverCache, Timings};
 /// Share of the initial objective below which what is left is taken for rounding: a millionth of a field, squared.
 const VANISHED: f64 = 1e-12;
 
+/// Share of the range of every variable, and of `ftol_rel` for the value, within which an evaluation has led nowhere from the best design.
+/// At an optimum on its bounds rounding keeps `mma` and `ccsaq` from believing their models, which they make steeper and steeper, and
+/// `ftol_rel` is not asked meanwhile: up to sixteen evaluations went to one design.
+const STAGNANT: [f64; 2] = [1e-6, 0.01];
+
 /// Share of what a search has gained above which what the gradient promises to first order is said: as much again may be there.
 const MUCH: f64 = 0.5;
 
@@ -197,6 +202,20 @@ impl<'a> Run<'a> {
             (evaluations, None) => best.evaluation > evaluations,
             (_, Some(values)) => best.has_gained(values, least),
         })
+    }
+
+    /// Whether an evaluation has led nowhere from what was the best design with its value before, after so many evaluations.
+    pub(super) fn is_stagnant(
+        &self,
+        (evaluations, best): (usize, Option<(Vec<f64>, f64)>),
+        sample: &Sample,
+        ([lower, upper], ftol_rel): (&[Vec<f64>; 2], f64),
+    ) -> bool {
+        let Some((design, value)) = best.filter(|_| self.evaluations() > evaluations) else { return false };
+        let [range_share, value_share] = STAGNANT;
+        (sample.value - value).abs() <= value_share * ftol_rel * value.abs()
+            && (0..design.len())
+                .all(|k| (self.last[k] - design[k]).abs() <= range_share * (upper[k] - lower[k]))
     }
 
     pub(super) fn warn(&mut self, message: &str) {

@@ -20,11 +20,6 @@ const MOST_ASTRAY: usize = 15;
 /// Share of the violation that so many must take away.
 const MENDED: f64 = 0.1;
 
-/// Share of the range of every variable, and of `ftol_rel` for the value, within which an evaluation has led nowhere from the best design.
-/// At an optimum on its bounds rounding keeps `mma` and `ccsaq` from believing their models, which they make steeper and steeper, and
-/// `ftol_rel` is not asked meanwhile: up to sixteen evaluations went to one design.
-const STAGNANT: [f64; 2] = [1e-6, 0.01];
-
 /// How often the trust region may shrink without a gain: to an eighth.
 const MAX_SHRINKS: usize = 3;
 
@@ -305,20 +300,4 @@ fn with_violation_as_objective(mut sample: Sample, of_problem: usize) -> Sample 
     let of_worse = |worst: usize, k: usize| if members[k].0 > members[worst].0 { k } else { worst };
     let (value, gradient) = members[(1..members.len()).fold(0, of_worse)].clone();
     Sample { value, gradient, members, ..sample }
-}
-
-impl Run<'_> {
-    /// Whether an evaluation has led nowhere from what was the best design with its value before, after so many evaluations.
-    fn is_stagnant(
-        &self,
-        (evaluations, best): (usize, Option<(Vec<f64>, f64)>),
-        sample: &Sample,
-        ([lower, upper], ftol_rel): (&[Vec<f64>; 2], f64),
-    ) -> bool {
-        let Some((design, value)) = best.filter(|_| self.evaluations() > evaluations) else { return false };
-        let [range_share, value_share] = STAGNANT;
-        (sample.value - value).abs() <= value_share * ftol_rel * value.abs()
-            && (0..design.len())
-                .all(|k| (self.last[k] - design[k]).abs() <= range_share * (upper[k] - lower[k]))
-    }
 }

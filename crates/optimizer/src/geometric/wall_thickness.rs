@@ -1,6 +1,5 @@
 //! Wall thickness of the designed bodies, measured along the direction of motion behind every design node (at an edge of designed faces
-//! along their normals), and before every node of
-//! the faces opposite where these are no planes.
+//! along their normals), and before every node of the faces opposite where these are no planes.
 //!
 //! From each node `x` of the design surface a ray runs against its direction `d` to where it leaves the body. On the
 //! undeformed mesh it meets a triangle there with corners `y_k`, at the weights `b_k`, and with the normal `n`. On a moved mesh the
@@ -15,8 +14,8 @@
 //! At an edge where designed faces meet the direction leans to all of them, and a ray against it says nothing of the lip that they make
 //! with the faces opposite: there one ray runs behind each of these faces, against its own normal, from a place in it a thousandth of
 //! the way from the node to its middle; `d` is the normal. The ray against the direction counts where it says less, as at the bottom of
-//! a groove. Where the faces meet at an acute angle they are each other's opposite, of no
-//! thickness at the edge: then it is the ray against the direction again.
+//! a groove. Where the faces meet at an acute angle they are each other's opposite, of no thickness at the edge: then it is the ray
+//! against the direction again.
 //!
 //! Between two design nodes the body may be thinner than behind both: before a step, a rib or a kink of the face opposite. So a ray runs
 //! from every node of that face as well, along `d`, to the triangle of the design surface that it leaves the body through; the roles of
@@ -286,7 +285,7 @@ pub fn faces_with_bodies(mesh: &Mesh, surface: &DesignSurface) -> Vec<([NodeId; 
     };
     let with_body = |facet: &Facet| {
         let outside = facet.outside?;
-        facet.nodes.iter().all(|n| surface.nodes().binary_search(n).is_ok()).then_some(())?;
+        surface.has_all(&facet.nodes).then_some(())?;
         let direction = facet.nodes.iter().find_map(direction_at)?;
         let corners = facet.nodes.map(|n| mesh.point(n));
         let is_ahead = dot(area_vector(corners), direction) > 0.0;
@@ -315,11 +314,11 @@ struct BodyFaces {
 impl BodyFaces {
     fn new(mesh: &Mesh, region: RegionId, surface: &DesignSurface) -> Self {
         let nodes = mesh.topology().boundary(region);
-        let of_design = |face: &&[NodeId; 3]| face.iter().all(|n| surface.nodes().binary_search(n).is_ok());
-        let is_designed: Vec<bool> = nodes.iter().map(|face| of_design(&face)).collect();
-        let (designed, others): (Vec<_>, Vec<_>) = nodes.iter().partition(of_design);
-        let [designed_nodes, other_nodes] =
-            [designed, others].map(|faces: Vec<&[NodeId; 3]>| faces.into_iter().flatten().copied().collect());
+        let is_designed: Vec<bool> = nodes.iter().map(|face| surface.has_all(face)).collect();
+        let [designed_nodes, other_nodes] = [true, false].map(|designed| {
+            let own = nodes.iter().zip(&is_designed).filter(|(_, is_designed)| **is_designed == designed);
+            own.flat_map(|(face, _)| *face).collect()
+        });
         let corners: Vec<[Point; 3]> = nodes.iter().map(|f| f.map(|n| mesh.point(n))).collect();
         let tree = BoxTree::new(corners.iter().map(reach).collect());
         let mut at_node: HashMap<NodeId, Vec<usize>> = HashMap::new();

@@ -64,8 +64,10 @@ impl<T> Ldlt<T> {
             unknowns: self.size(),
             cause: format!("the pivot of unknown {unknown} is {pivot}: the matrix is not positive definite"),
         };
-        lost.map(failed).map_or(Ok(()), Err)?;
-        Ok(self)
+        match lost.map(failed) {
+            Some(error) => Err(error),
+            None => Ok(self),
+        }
     }
 
     /// What the factor of another matrix may begin with: the panels that the analysis says are kept, if it has some.
