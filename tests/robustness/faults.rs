@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use fluxmorph::config::{Config, SourceMap};
+use fluxmorph::config::{Config, Optimizer, SourceMap};
 use fluxmorph::files::{OutputError, RunResult};
 use fluxmorph::run::RunLimits;
 use fluxmorph::{Error, ExitCode};
@@ -117,6 +117,10 @@ fn reference(device: &(Config, SourceMap)) -> Essence {
 
 #[test]
 fn no_fault_of_the_disk_loses_or_tears_anything() {
+    let of = |(config, source): (Config, SourceMap), max_evaluations: usize| {
+        let optimizer = Optimizer { max_evaluations, ..config.optimizer };
+        (Config { optimizer, ..config }, source)
+    };
     let start = |device: &(Config, SourceMap)| {
         let expected = reference(device);
         let work = |disk: &SimulatedDisk| run(&disk.shared(), device);
@@ -126,9 +130,7 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
     let again = |device: &(Config, SourceMap), evaluations: usize| {
         let expected = reference(device);
         let disk = SimulatedDisk::default();
-        let mut first = device.clone();
-        first.0.optimizer.max_evaluations = evaluations;
-        run(&disk.shared(), &first).unwrap_or_else(|e| panic!("{e}"));
+        run(&disk.shared(), &of(device.clone(), evaluations)).unwrap_or_else(|e| panic!("{e}"));
         let limits = RunLimits { max_evaluations: Some(device.0.optimizer.max_evaluations), max_time: None };
         let work = |disk: &SimulatedDisk| resume(&disk.shared(), limits);
         Trial { disk: &disk, device, expected: &expected, limits, work: &work }.all()
@@ -141,8 +143,12 @@ fn no_fault_of_the_disk_loses_or_tears_anything() {
         let limits = RunLimits::default();
         Trial { disk: &disk, device, expected: &expected, limits, work: &work }.all()
     };
-    let tallies =
-        [start(&block(&[])), again(&block(&[]), 2), replaced(&constrained()), again(&moved_by(LINEAR), 4)];
+    let tallies = [
+        start(&of(block(&[]), 3)),
+        again(&of(block(&[]), 4), 2),
+        replaced(&of(constrained(), 3)),
+        again(&of(moved_by(LINEAR), 8), 4),
+    ];
     println!("{tallies:?}");
     let total = tallies.into_iter().fold(Tally::default(), |sum, tally| sum + tally);
     println!("together: {total:?}");

@@ -163,3 +163,20 @@ fn the_deviation_where_the_mesh_moves_lies_in_the_elements_that_hold_the_places(
     let page = run.text("report.html");
     assert!(page.contains("at places that stay") && page.contains("Deviation of the field"));
 }
+
+#[test]
+fn the_page_names_the_load_at_which_the_quality_is_asked_for() {
+    let home = folder();
+    let loads = (
+        "[analysis]",
+        "[[loads]]\nname = \"rest\"\nfrequency = 0\n\n[[loads]]\nname = \"a-c\"\n\n[analysis]",
+    );
+    let asked_for = ("kind = \"flux_density_squared\"", "kind = \"homogeneity\"\nload = \"a-c\"");
+    let out = home.path().join("out");
+    finish(&mut written("block", home.path(), &[loads, asked_for, AT_REST[1]]).command("run", &out))
+        .completed();
+    let run = RunFolder(out);
+    assert_eq!(run.result()["objective"]["state"], "a-c");
+    let page = run.text("report.html");
+    assert!(page.contains("what is asked for, under the load a-c, in"), "{page}");
+}

@@ -1,6 +1,8 @@
 //! The force on a conductor behind its surface.
 
 use crate::plausible::{set, texts};
+use crate::support::device::written;
+use crate::support::folder::{RunFolder, vectors};
 use crate::support::program::{command, finish, folder};
 use crate::support::shield::quick;
 
@@ -24,4 +26,22 @@ fn a_force_on_a_conductor_that_its_surface_replaces_is_reported() {
     let (found, bars) = ([&nodal, &edge].map(force), [&nodal, &edge].map(bar));
     assert!((found[0] - found[1]).abs() < bars[0] + bars[1] && found[1] > 60.0, "{found:?} {bars:?}");
     assert!(!texts(&nodal["warnings"]).contains("no force acts"), "{nodal}");
+}
+
+/// Of two bodies with a region in common the first is drawn.
+#[test]
+fn the_forces_of_a_field_file_count_a_region_once() {
+    let home = folder();
+    let bodies = "[[forces]]\nname = \"iron\"\nregions = [\"iron\"]\n\n\
+                  [[forces]]\nname = \"both\"\nregions = [\"gap\", \"iron\"]\n\n[objective]";
+    let out = home.path().join("out");
+    finish(&mut written("block", home.path(), &[("[objective]", bodies)]).command("solve", &out)).completed();
+    let run = RunFolder(out);
+    let (field, result) = (run.field(0), run.result());
+    let nodal = vectors(&field.point_data["force"]);
+    for d in 0..3 {
+        let sum: f64 = nodal.iter().map(|force| force[d]).sum();
+        let own = result["forces"][0]["force_n"][d].as_f64().expect("a number");
+        assert!((sum - own).abs() <= 1e-9 * own.abs() && own != 0.0, "{sum} {own}");
+    }
 }

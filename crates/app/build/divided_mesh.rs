@@ -13,7 +13,7 @@ use fluxmorph_optimizer::problem::Problem;
 
 use super::mesh::{build, named_interfaces};
 use super::open;
-use super::references::functionals;
+use super::references::{body_of, expansion_of, functionals, region_in_mesh};
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
 
@@ -105,10 +105,17 @@ fn device(config: &Config, problem: &Problem) -> Option<[Point; 2]> {
     let topology = problem.original().topology();
     let mut elements = problem.moving_elements().to_vec();
     let measured = functionals(config).into_iter().filter(|(_, own)| own.kind.is_of_field());
-    for region in measured.filter_map(|(_, own)| own.region.as_deref()) {
-        elements.extend(topology.region(region).map(|id| topology.elements_of(id)).unwrap_or_default());
+    let mut ends: Vec<Point> = Vec::new();
+    for (_, own) in measured {
+        let of_body = body_of(config, own).into_iter().flat_map(|body| &body.regions).map(String::as_str);
+        for region in region_in_mesh(own).into_iter().chain(of_body) {
+            elements.extend(topology.region(region).map(|id| topology.elements_of(id)).unwrap_or_default());
+        }
+        if let Some(set) = expansion_of(config, own) {
+            ends.extend([-set.radius, set.radius].map(|reach| set.center.map(|c| c + reach)));
+        }
     }
-    let corners = elements.iter().flat_map(|&e| problem.original().vertices(e));
+    let corners = elements.iter().flat_map(|&e| problem.original().vertices(e)).chain(ends);
     corners.fold(None, |around, x| {
         let [low, high] = around.unwrap_or([x, x]);
         Some([[0, 1, 2].map(|d| low[d].min(x[d])), [0, 1, 2].map(|d| high[d].max(x[d]))])
@@ -121,6 +128,31 @@ mod tests {
     use fluxmorph_geometry::ElementId;
     use fluxmorph_geometry::generate::BoxRegion;
     use fluxmorph_geometry::tet4::volume;
+
+    use crate::build::{Mode, set_up};
+
+    /// Of the quick shield nothing moves where it is observed.
+    #[test]
+    fn the_device_holds_the_bodies_and_expansions_that_are_asked_about() {
+        let home = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("configs");
+        let shipped = std::fs::read_to_string(home.join("shield_quick.toml")).expect("it is shipped");
+        let observed = "kind = \"flux_density_squared\"\nregion = \"observation\"\nweighting = \"point\"\n";
+        let lowest = |objective: &str| {
+            let text = shipped.replace(observed, objective);
+            let (config, source) = Config::from_str(&text, "test.toml").expect("a sound configuration");
+            let problem = set_up(&config, &source, Mode::Optimisation).expect("a sound problem").problem;
+            device(&config, &problem).expect("something moves")[0][2]
+        };
+        let of_region = lowest(observed);
+        assert!(lowest("kind = \"loss\"\nregion = \"plate\"\n") > of_region);
+        let body = "[[forces]]\nname = \"seen\"\nregions = [\"observation\"]\n";
+        let force = "kind = \"force\"\nregion = \"seen\"\ndirection = [0, 0, 1]\n";
+        assert_eq!(lowest(&format!("{force}{body}")), of_region);
+        let ball = "[[multipoles]]\nname = \"ball\"\nshape = \"ball\"\ncenter = [0, 0, \"-200 mm\"]\naxis = \"z\"\n\
+                    radius = \"30 mm\"\norder = 2\nmain = 0\n";
+        let content = "kind = \"multipole_content\"\nregion = \"ball\"\nharmonics = [\"c1_0\"]\n";
+        assert!((lowest(&format!("{content}{ball}")) + 0.23).abs() < 1e-12);
+    }
 
     #[test]
     fn the_cells_of_a_divided_mesh_are_the_elements_that_were_divided() {

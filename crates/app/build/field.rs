@@ -20,7 +20,7 @@ use fluxmorph_solver::{
 };
 
 use super::curves::Curves;
-use super::entries::material;
+use super::entries::{material, solid_coil};
 use super::locate_error::DiagnosticSink;
 use super::{loads, open};
 use crate::config::{
@@ -398,14 +398,20 @@ pub(super) fn coil_faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic
     faults
 }
 
-/// A solid conductor that does not conduct.
+/// A solid conductor that does not conduct, and one that is another coil's too: it has one voltage between its terminals.
 fn solid_fault(config: &Config, source: &SourceMap, coil: usize, region: &str) -> Option<Diagnostic> {
-    if material(config, region).conductivity > 0.0 {
-        return None;
+    let fault = |message: String| source.diagnostic(&format!("coils[{coil}].region"), message);
+    if material(config, region).conductivity == 0.0 {
+        let fault = fault(format!("`{region}` is a solid conductor, but does not conduct"));
+        return Some(
+            fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""),
+        );
     }
-    let path = format!("coils[{coil}].region");
-    let fault = source.diagnostic(&path, format!("`{region}` is a solid conductor, but does not conduct"));
-    Some(fault.expected("a material with a conductivity for the region, or conductor = \"stranded\""))
+    let twin = solid_coil(config, region).filter(|own| own.name != config.coils[coil].name)?;
+    config.alternates().then(|| {
+        fault(format!("`{region}` is already the solid conductor of the coil `{}`", twin.name))
+            .expected("one coil with the sum of both currents, or a region for each conductor")
+    })
 }
 
 /// Remanence of every region [T], by `RegionId`; zero where there is no magnet.

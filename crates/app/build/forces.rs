@@ -8,7 +8,7 @@ use fluxmorph_solver::coil;
 
 use super::entries::{is_magnet, is_wound, material};
 use super::plausible::{INCLINED, place_of_current, windings};
-use super::references::functionals;
+use super::references::{body_of, functionals};
 use super::soundness::faces_of;
 use crate::config::{Config, ForceBody, ObjectiveKind, RegionModel};
 
@@ -19,10 +19,9 @@ const ONE_DIRECTION: f64 = 0.9998;
 pub(super) fn warnings(config: &Config, mesh: &Mesh, coils: &[coil::Coil]) -> Vec<String> {
     let bodies = config.forces.iter().filter_map(|body| force_warning(config, mesh, coils, body));
     // Of one that is sought for more is said.
-    let is_sought = |body: &&ForceBody| {
-        functionals(config).iter().any(|(_, own)| own.region.as_ref() == Some(&body.name))
-    };
-    let reported = config.forces.iter().filter(|body| !is_sought(body));
+    let functionals = functionals(config);
+    let sought: Vec<&ForceBody> = functionals.iter().filter_map(|(_, own)| body_of(config, own)).collect();
+    let reported = config.forces.iter().filter(|body| sought.iter().all(|own| own.name != body.name));
     let cut = reported.filter_map(|body| cut_winding_warning(config, mesh, body));
     bodies.chain(cut).chain(cut_warnings(config, mesh)).collect()
 }
@@ -115,9 +114,7 @@ fn cutting_surfaces(
 fn cut_warnings(config: &Config, mesh: &Mesh) -> Vec<String> {
     let mut warnings = Vec::new();
     for (path, own) in functionals(config) {
-        let Some(body) = config.forces.iter().find(|body| Some(&body.name) == own.region.as_ref()) else {
-            continue;
-        };
+        let Some(body) = body_of(config, own) else { continue };
         let direction = own.direction.unwrap_or_default();
         // Of the virtual motion of the body.
         let velocity = |x: Point| match own.kind {

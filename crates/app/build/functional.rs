@@ -17,7 +17,7 @@ use fluxmorph_solver::functional::{self, AtTerminals, Follow, Inductive, Observe
 use fluxmorph_solver::{FieldModel, Functional, RigidMotion};
 
 use super::entries::density;
-use super::references::{functionals, regions};
+use super::references::{body_of, functionals, regions};
 use super::shape::may_move;
 use crate::config::{
     self, Combination, Config, Diagnostic, Limit as Written, LoadCase, ObjectiveKind, SourceMap, ValueBound,
@@ -126,7 +126,7 @@ fn measured(
             Ok(Functional::energy(model, functional.region.is_some().then(region).transpose()?)?)
         }
         ObjectiveKind::Force | ObjectiveKind::Torque => {
-            let body = config.forces.iter().find(|body| body.name == name).expect("checked with the names");
+            let body = body_of(config, functional).expect("checked with the names");
             let direction = functional.direction.unwrap_or_default();
             let motion = if functional.kind == ObjectiveKind::Force {
                 RigidMotion::Translation(direction)

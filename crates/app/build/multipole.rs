@@ -14,7 +14,7 @@ use fluxmorph_solver::{FieldModel, Functional, SolverError};
 
 use super::functional::follow;
 use super::locate_error::DiagnosticSink;
-use super::references::functionals;
+use super::references::{expansion_of, functionals};
 use super::soundness::faces_of;
 use crate::config::{self, Config, Diagnostic, ExpansionShape, MultipoleSet, ObjectiveKind, SourceMap};
 use crate::error::Error;
@@ -187,9 +187,10 @@ pub(crate) fn multipoles(
     let expansion = expansion(set)?;
     let planes = Planes::of(config, set, (model, mesh)).mirrors;
     // What is reported is what is made of it.
-    let named =
-        functionals(config).into_iter().map(|(_, f)| f).filter(|f| f.region.as_ref() == Some(&set.name));
-    let written = named.filter(|f| f.kind.is_of_terms()).find_map(|f| f.follow);
+    let functionals = functionals(config).into_iter().map(|(_, own)| own);
+    let of_set =
+        |own: &&config::Functional| expansion_of(config, own).is_some_and(|found| found.name == set.name);
+    let written = functionals.filter(of_set).find_map(|own| own.follow);
     Ok(Multipoles::new(model, mesh, &set.name, &expansion, (&planes, follow(written)))?)
 }
 
@@ -200,8 +201,7 @@ pub(super) fn functional(
     mesh: &Mesh,
     model: &FieldModel,
 ) -> Result<Functional, Error> {
-    let region = wanted.region.as_deref().unwrap_or_default();
-    let set = config.multipoles.iter().find(|set| set.name == region).expect("checked with the names");
+    let set = expansion_of(config, wanted).expect("checked with the names");
     let harmonics: Vec<Harmonic> = wanted.harmonics.iter().flatten().filter_map(|text| parse(text)).collect();
     let of = match (wanted.kind, harmonics.first()) {
         (ObjectiveKind::Multipole, Some(first)) => OfTerms::Coefficient(*first),

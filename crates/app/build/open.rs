@@ -5,7 +5,7 @@ use fluxmorph_geometry::topology::Topology;
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_solver::{Boundary, OpenRegion};
 
-use super::references::{functionals, is_condition, surface_names};
+use super::references::{functionals, is_condition, region_in_mesh, surface_names};
 use crate::config::{Config, Diagnostic, ObjectiveKind, Open, SourceMap};
 use crate::error::Error;
 
@@ -79,7 +79,7 @@ pub(super) fn faults(config: &Config, source: &SourceMap) -> Vec<Diagnostic> {
         })
     };
     let observed = |(path, functional): (String, &crate::config::Functional)| {
-        let is_inside = functional.region.as_deref() == Some(region_of(open));
+        let is_inside = region_in_mesh(functional) == Some(region_of(open));
         (is_inside && functional.kind != ObjectiveKind::Energy).then(|| {
             let message = format!("`{}` stands for all space outside", region_of(open));
             source

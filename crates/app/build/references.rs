@@ -1,7 +1,7 @@
 //! Where a configuration names surfaces, regions and functionals: each name with the key path at which it stands. Whether
 //! the mesh has them is `names`' business.
 
-use crate::config::{self, CoilPath, CoilShape, Config, Target};
+use crate::config::{self, CoilPath, CoilShape, Config, ForceBody, MultipoleSet, Target};
 
 /// Whether the path of a key is that of a condition on a surface.
 pub(super) fn is_condition(path: &str) -> bool {
@@ -65,12 +65,31 @@ pub(crate) fn functionals(config: &Config) -> Vec<(String, &config::Functional)>
     terms.chain(constraints).collect()
 }
 
+/// The region of the mesh that a functional names; none of a body or an expansion, which may be called as a region is.
+pub(crate) fn region_in_mesh(functional: &config::Functional) -> Option<&str> {
+    functional.region.as_deref().filter(|_| functional.kind.is_of_a_region())
+}
+
+/// The body that a functional acts on.
+pub(super) fn body_of<'a>(config: &'a Config, functional: &config::Functional) -> Option<&'a ForceBody> {
+    let name = functional.region.as_ref().filter(|_| functional.kind.is_of_a_body())?;
+    config.forces.iter().find(|body| body.name == *name)
+}
+
+/// The expansion that a functional is of.
+pub(super) fn expansion_of<'a>(
+    config: &'a Config,
+    functional: &config::Functional,
+) -> Option<&'a MultipoleSet> {
+    let name = functional.region.as_ref().filter(|_| functional.kind.is_of_terms())?;
+    config.multipoles.iter().find(|set| set.name == *name)
+}
+
 /// Key path and name of every region that objective and constraints name.
 pub(super) fn regions<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
     let measured = functionals(config)
         .into_iter()
-        .filter(|(_, f)| f.kind.is_of_a_region())
-        .filter_map(|(path, f)| Some((format!("{path}.region"), f.region.as_deref()?)));
+        .filter_map(|(path, f)| Some((format!("{path}.region"), region_in_mesh(f)?)));
     let forces = config.forces.iter().enumerate().flat_map(|(k, force)| {
         let path = move |(i, name): (usize, &'a String)| (format!("forces[{k}].regions[{i}]"), name.as_str());
         force.regions.iter().enumerate().map(path)

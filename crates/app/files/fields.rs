@@ -31,7 +31,8 @@ pub struct FieldData<'a> {
     pub deviation: Option<&'a [f64]>,
     /// One solution per state. For a piece only the potentials at its nodes matter.
     pub solutions: &'a [FieldSolution],
-    /// Bodies with the forces at their nodes in the first state; empty: no such array.
+    /// Bodies with the forces at their nodes in the first state, but for those that share a region with one before them; empty: no such
+    /// array.
     pub bodies: &'a [Body],
 }
 
@@ -136,8 +137,14 @@ impl Arrays {
         let in_elements = |all: &[f64]| elements.iter().map(|e| all[e.index()]).collect();
         let force = (!data.bodies.is_empty()).then(|| {
             let mut force = vec![[0.0; 3]; data.mesh.points().len()];
+            let mut drawn: Vec<&Body> = Vec::new();
+            for body in data.bodies {
+                if drawn.iter().all(|own| !own.overlaps(body)) {
+                    drawn.push(body);
+                }
+            }
             let of = |body: &Body| body.nodal(&states[0], data.mesh, &data.solutions[0]);
-            for (node, own) in data.bodies.iter().flat_map(of) {
+            for (node, own) in drawn.into_iter().flat_map(of) {
                 (0..3).for_each(|d| force[node.index()][d] += own[d]);
             }
             at(&force)

@@ -17,7 +17,9 @@ use fluxmorph_optimizer::problem::{Analysis, Problem, SolverCache};
 use super::Session;
 use super::finer::{Cut, FinerProblem};
 use super::reported::Reported;
-use crate::build::{functionals, is_air, is_open, is_pushed, is_wound, memory_limit, remaining_nodes};
+use crate::build::{
+    functionals, is_air, is_open, is_pushed, is_wound, memory_limit, region_in_mesh, remaining_nodes,
+};
 use crate::config::Config;
 use crate::error::Error;
 use crate::files::{CurvedFacets, OverwritePolicy, SAFETY, StateErrors};
@@ -170,7 +172,7 @@ fn is_empty(config: &Config, name: &str) -> bool {
 
 /// Whether a force or a functional is of a region.
 fn is_observed(config: &Config, name: &str) -> bool {
-    is_pushed(config, name) || functionals(config).iter().any(|(_, own)| own.region.as_deref() == Some(name))
+    is_pushed(config, name) || functionals(config).iter().any(|(_, own)| region_in_mesh(own) == Some(name))
 }
 
 /// The nodes of the design surface on a mesh with all its regions, where they are the variables: their facets are the design. With a

@@ -355,7 +355,8 @@ pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) 
         rms_ppm: 1e6 * quality.rms,
         initial_rms_ppm: weight.map(|weight| 1e6 * (initial / weight).sqrt()),
         peak_to_peak_ppm: 1e6 * quality.peak_to_peak,
-        state: (problem.states().len() > 1).then(|| model.label()),
+        state: (problem.states().len() > 1)
+            .then(|| model.setup().load_case.clone().unwrap_or_else(|| model.label())),
     })
 }
 

@@ -14,6 +14,8 @@ pub struct Body {
     name: String,
     /// The point that the torque is taken about [m].
     about: Point,
+    /// What it is made of.
+    regions: Vec<RegionId>,
     force: Force,
 }
 
@@ -45,7 +47,12 @@ impl Body {
     ) -> Result<Self, SolverError> {
         // Which motion does not matter: the forces at the nodes hold all of them.
         let force = Force::new(model, mesh, name, regions, RigidMotion::Translation([0.0, 0.0, 1.0]))?;
-        Ok(Self { name: name.to_owned(), about, force })
+        Ok(Self { name: name.to_owned(), about, regions: regions.to_vec(), force })
+    }
+
+    /// Whether a region is a part of both.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.regions.iter().any(|own| other.regions.contains(own))
     }
 
     /// What acts on its nodes [N].

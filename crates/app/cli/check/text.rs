@@ -9,8 +9,8 @@ use super::estimate::{ConstraintError, EstimateSummary};
 use super::reach::Reach;
 use super::summary::{FieldProblem, Summary};
 use crate::config::{
-    CoilShape, Constraint, Corner, DesignDirection, Limit, Material, RegionModel, RemeshExtent, ValueBound,
-    WrittenCurve,
+    CoilShape, Constraint, Corner, DesignDirection, Limit, Material, Objective, RegionModel, RemeshExtent,
+    ValueBound, WrittenCurve,
 };
 use crate::files::{SAFETY, shell_word};
 use crate::show::text_table::{Align, Table};
@@ -28,7 +28,8 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
     row("memory, about", format!("{:.0} MiB", summary.memory_estimate_bytes as f64 / (1 << 20) as f64));
     row("output", summary.output_directory.clone());
     if let Some(found) = &summary.estimate {
-        estimate(found, summary.objective_unit, summary.constraints, &mut row);
+        let unit = summary.objective.map_or("", Objective::shown_unit);
+        estimate(found, unit, summary.constraints, &mut row);
     }
     text += &region_table(summary).text();
     text += &material_table(summary).text();
@@ -54,11 +55,11 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
 /// The objective of the initial design with its error bar, or why there is none.
 fn estimate(
     found: &EstimateSummary,
-    unit: Option<&str>,
+    unit: &str,
     constraints: &[Constraint],
     row: &mut impl FnMut(&str, String),
 ) {
-    let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     if let (Some(value), Some(error), Some(bar)) =
         (found.objective, found.error_estimate, found.error_bar_relative)
     {

@@ -1,5 +1,7 @@
 //! Before and after: what the field misses of the quality that is asked for, where it is asked for.
 
+use std::collections::BTreeSet;
+
 use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::tet4::volume;
 use maud::{Markup, html};
@@ -9,10 +11,12 @@ use super::cut::{CutPlane, NodeMeans, Patch};
 use super::data::{RunData, Snapshot};
 use super::picture::{Picture, pair};
 use super::plane::{Plane, bounds, extremes};
-use super::tables::of_first_state;
+use super::tables::behind_title;
 use super::ticks::{Count, number};
 use super::window::Window;
-use crate::build::Outline;
+use crate::build::{Outline, functionals};
+use crate::config::ObjectiveKind;
+use crate::show::states::State;
 
 /// Share of the picture that is added around the elements.
 const ROOM: f64 = 0.04;
@@ -59,8 +63,21 @@ pub(super) fn figure(data: &RunData, outline: &Outline) -> Option<Result<Markup,
     let all: Vec<Deviation<'_>> = fields.filter_map(|field| Deviation::of(outline, field)).collect();
     let last = all.last()?;
     let window = window(outline, last);
-    let state = data.result.as_ref().map(of_first_state).unwrap_or_default();
-    Some(drawn(outline, window, (&all, &state)))
+    Some(drawn(outline, window, (&all, &states(data))))
+}
+
+/// The loads or frequencies at which qualities are asked for, where there are several: of each its first.
+fn states(data: &RunData) -> String {
+    use ObjectiveKind::{Homogeneity, MultipoleContent, TargetField};
+    let Some(result) = &data.result else { return String::new() };
+    let cases = data.config.load_cases();
+    let asked_for = functionals(&data.config).into_iter().map(|(_, own)| own);
+    let taken = asked_for
+        .filter(|own| matches!(own.kind, TargetField | Homogeneity | MultipoleContent))
+        .filter_map(|own| cases.iter().position(|case| own.is_taken_under(case)));
+    let all = State::all(result);
+    let taken: BTreeSet<usize> = taken.collect();
+    taken.into_iter().filter_map(|index| all.get(index)).map(behind_title).collect()
 }
 
 /// Across the shortest extent of the elements, through their middle.

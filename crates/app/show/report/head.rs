@@ -184,10 +184,7 @@ fn mean_card(data: &RunData, outline: &Outline) -> Option<Card> {
     };
     let [before, after] = data.fields.each_ref().map(mean);
     let state = data.result.as_ref().map(of_first_state).unwrap_or_default();
-    // A body of [[forces]] and an expansion are no regions.
-    let is_region = |name: &&str| outline.mesh.topology().region(name).is_ok();
-    let names: Vec<&str> = observed::region_names(data).into_iter().filter(is_region).collect();
-    let regions = names.join(", ") + &state;
+    let regions = observed::region_names(data).join(", ") + &state;
     let remark = before.map_or(regions.clone(), |before| format!("{before} before, in {regions}"));
     Some(("mean |B|", after?, remark))
 }

@@ -5,7 +5,7 @@ use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::tet4::volume;
 
 use super::data::{RunData, Snapshot};
-use crate::build::Outline;
+use crate::build::{Outline, region_in_mesh};
 use crate::config::Functional;
 
 /// Names of these regions, each once.
@@ -20,7 +20,7 @@ pub(super) fn region_names(data: &RunData) -> Vec<&str> {
 
 fn unique<'a>(functionals: impl Iterator<Item = &'a Functional>) -> Vec<&'a str> {
     let mut names: Vec<&str> = Vec::new();
-    for name in functionals.filter(|own| own.kind.is_of_field()).filter_map(|own| own.region.as_deref()) {
+    for name in functionals.filter(|own| own.kind.is_of_field()).filter_map(region_in_mesh) {
         if !names.contains(&name) {
             names.push(name);
         }

@@ -348,12 +348,13 @@ pub(super) fn skin(outline: &Outline, result: Option<&RunResult>) -> Markup {
         ["conductor", "model", "skin depth [mm]", "elements per skin depth", "thickness 2V/S [skin depths]"];
     // What is supposed of iron with a B–H curve a result knows.
     let is_said = |own: &&Audited| result.is_none() || own.permeability_of == PermeabilityOf::Material;
+    let finds_nothing = skin_warnings(outline.audits.iter()).is_empty();
     let warnings = skin_warnings(outline.audits.iter().filter(is_said));
     // What a result warns of stands above.
     let said = |warning: &String| result.is_some_and(|result| result.warnings.contains(warning));
     html! {
         (table(&head, &rows, None))
-        @if warnings.is_empty() { (note("The skin-depth audit of the undeformed mesh found nothing to warn about.")) }
+        @if finds_nothing { (note("The skin-depth audit of the undeformed mesh found nothing to warn about.")) }
         @for warning in warnings.iter().filter(|warning| !said(warning)) { p class="warning" { (warning) } }
     }
 }

@@ -206,6 +206,8 @@ impl Run<'_> {
     pub(super) fn compare(&self, objective: f64, sample: &Sample) -> Comparison {
         match &self.best {
             None => Comparison::First,
+            // Whatever its violation, see `start`.
+            Some(best) if self.is_taking_up && sample.value < best.sample.value => Comparison::Better,
             Some(best) => best.compare(self.goal, objective, sample),
         }
     }

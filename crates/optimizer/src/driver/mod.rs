@@ -19,7 +19,8 @@
 //! * An interrupted run is resumed by replay: the recorder gives its evaluations back, and as long as the method asks for
 //!   the same designs to the last bit they are the answers (`replay`). The method
 //!   is then in the state that it was in. Anything else is an error.
-//! * On a finer mesh a search goes on from the best design of the one before (`start`). A supervisor looks at
+//! * On a finer mesh a search goes on from the best design of the one before, also where it is beyond a bound there; where nothing
+//!   better than the initial design comes of that, it begins anew (`start`). A supervisor looks at
 //!   a search between two evaluations, and may end it for that (`supervisor`).
 //! * Limits of evaluations and time are checked before the mesh of each evaluation but the first: what was
 //!   computed is kept, and there is a best design. A signal may come before the first evaluation, or during the replay:
@@ -126,6 +127,10 @@ fn advance(search: &mut Search<'_>, run: &mut Run<'_>) -> Result<Option<StopReas
     match search.decide(run, ended)? {
         NextStep::Stop(reason) => {
             let reason = run.step_back(reason)?;
+            if reason.is_some_and(StopReason::is_of_method) && run.take_back() {
+                search.begin_anew(run);
+                return Ok(None);
+            }
             search.move_trust_region(run);
             return Ok(reason);
         }

@@ -162,15 +162,7 @@ impl Run<'_> {
     /// As an evaluation; one that fails for its numbers leaves the search at its end.
     pub(super) fn step_back(&mut self, reason: StopReason) -> Result<Option<StopReason>, Error> {
         let is_limit = reason == StopReason::MaxEvaluations;
-        let is_of_method = matches!(
-            reason,
-            StopReason::ObjectiveConverged
-                | StopReason::StepConverged
-                | StopReason::RoundoffLimited
-                | StopReason::MethodStalled
-                | StopReason::MeshLimited
-        );
-        if !(is_of_method || is_limit) || self.untried(&[]).is_none() {
+        if !(reason.is_of_method() || is_limit) || self.untried(&[]).is_none() {
             return Ok(Some(reason));
         }
         if !self.is_replaying() {

@@ -43,6 +43,8 @@ pub(super) struct Run<'a> {
     pub(super) known_bounds: Vec<f64>,
     /// Whether the design of a coarser mesh is evaluated.
     pub(super) is_taking_up: bool,
+    /// The initial design, where that of a coarser mesh counts as the best one although it is beyond a bound on this mesh.
+    pub(super) set_aside: Option<Incumbent>,
     /// Evaluations that were not replayed.
     pub(super) computed: usize,
     pub(super) last: Vec<f64>,
@@ -99,6 +101,7 @@ impl<'a> Run<'a> {
             initial: None,
             known_bounds: Vec::new(),
             is_taking_up: false,
+            set_aside: None,
             computed: 0,
             last,
             latest: None,
@@ -299,7 +302,7 @@ impl<'a> Run<'a> {
         let miss = NearMiss::of(&record, &sample, bounds);
         self.near_misses.extend(miss);
         if comparison.is_improved() {
-            self.best = Some(Incumbent {
+            let before = self.best.replace(Incumbent {
                 evaluation: record.row.evaluation,
                 values: record.design,
                 objective: record.row.objective,
@@ -307,6 +310,9 @@ impl<'a> Run<'a> {
                 sample,
                 field: field(),
             });
+            if self.is_taking_up && self.violates() {
+                self.set_aside = before;
+            }
         }
         let values = self.incumbent_sample();
         self.near_misses.retain(|miss| values.is_none_or(|best| miss.gain(best).is_some()));
@@ -408,6 +414,9 @@ impl<'a> Run<'a> {
             return Err(Error::Replay { evaluation, cause });
         }
         let goes_on = stop_reason == StopReason::Superseded;
+        if !goes_on {
+            self.take_back();
+        }
         let warnings = if goes_on { Vec::new() } else { self.reservations(stop_reason) };
         warnings.iter().for_each(|warning| self.warn(warning));
         let (Some(best), Some(initial)) = (self.best.take(), self.initial.take()) else {
@@ -431,19 +440,23 @@ impl<'a> Run<'a> {
         })
     }
 
-    /// What is to be said at the end of the best design and its constraints.
-    fn reservations(&self, stop_reason: StopReason) -> Vec<String> {
+    /// The constraints that the best design does not keep, each with its excess, in words.
+    pub(super) fn violations(&self) -> Vec<String> {
         let (Some(best), Some(initial)) = (&self.best, &self.initial) else { return Vec::new() };
         let limits = self.problem.constraints().iter().zip(&initial.bounds);
         let violated = best.sample.constraints.iter().zip(limits);
         let violated = violated.filter(|((excess, _), _)| *excess > CONSTRAINT_TOLERANCE);
-        let names: Vec<String> = violated
-            .map(|((excess, _), (own, bound))| {
-                let margin =
-                    if own.has_margin() { " (the search keeps a hundredth of it as a margin)" } else { "" };
-                format!("`{}` by {excess:.1e} {}{margin}", own.name, bound.excess_is())
-            })
-            .collect();
+        let words = violated.map(|((excess, _), (own, bound))| {
+            let margin =
+                if own.has_margin() { " (the search keeps a hundredth of it as a margin)" } else { "" };
+            format!("`{}` by {excess:.1e} {}{margin}", own.name, bound.excess_is())
+        });
+        words.collect()
+    }
+
+    /// What is to be said at the end of the best design and its constraints.
+    fn reservations(&self, stop_reason: StopReason) -> Vec<String> {
+        let (Some(best), Some(initial)) = (&self.best, &self.initial) else { return Vec::new() };
         let mut warnings = Vec::new();
         let gain = (best.objective / initial.objective - 1.0).abs();
         let promised = self.surely_promised().or_else(|| self.promised_beside(gain));
@@ -459,7 +472,7 @@ impl<'a> Run<'a> {
             warnings.push(format!(
                 "no design keeps all constraints: the best one is beyond the bound of {}; loosen what is violated, widen the \
                  design's bounds, or allow more evaluations",
-                names.join(", of ")
+                self.violations().join(", of ")
             ));
         }
         if let Some(miss) = self.missed().filter(|_| best.violation == 0.0) {

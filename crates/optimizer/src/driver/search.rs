@@ -266,6 +266,12 @@ impl<'a> Search<'a> {
         run.note_going_on(&what, &plan);
     }
 
+    /// Begins again at the best design, as the first search does.
+    pub(super) fn begin_anew(&mut self, run: &mut Run<'_>) {
+        *self = Self::new(run, self.settings);
+        run.note_going_on("the initial design is the best one", ": the search begins anew");
+    }
+
     /// Continues with the worst constraint as the objective.
     pub(super) fn restore(&mut self, run: &mut Run<'_>) {
         self.is_restoring = true;

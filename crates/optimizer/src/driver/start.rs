@@ -1,5 +1,8 @@
-//! Where a search begins: at the initial design, or with the best one of a search on a coarser mesh.
+//! Where a search begins: at the initial design, or with the best one of a search on a coarser mesh. What is bounded has other values on
+//! another mesh, so that this one may be beyond a bound there. It counts as the best one all the same, and the initial one is set aside
+//! until the search has come to a better one within the bounds.
 
+use super::incumbent::{Comparison, Incumbent};
 use super::run::Run;
 use super::stop::{Refusal, Stop};
 use super::stop_reason::StopReason;
@@ -22,8 +25,8 @@ pub struct Start {
 }
 
 impl Run<'_> {
-    /// Evaluates the initial design and the one to go on from; where the latter is no better on this mesh, or cannot be reached,
-    /// the search begins at the initial one. A reason where that is not the end of it.
+    /// Evaluates the initial design and the one to go on from, which is the best one then where its objective is better on this mesh;
+    /// where it is not, or the mesh does not carry it, the search begins at the initial one. A reason where that is not the end of it.
     ///
     /// # Errors
     /// As an evaluation; [`Error::FirstDesign`] where the mesh does not carry the initial design.
@@ -41,13 +44,34 @@ impl Run<'_> {
             return Ok(reason);
         }
         let has_gained = self.best_evaluation().is_some_and(|best| best > self.first_evaluation);
-        if !has_gained && design != initial {
+        if self.set_aside.is_some() {
+            let beyond = self.violations().join(", of ");
+            let what =
+                format!("on this mesh the best design of the coarser one is beyond the bound of {beyond}");
+            self.note_going_on(&what, ": the search begins there");
+        } else if !has_gained && design != initial {
             self.warn(
                 "the best design of the coarser mesh is no better than the initial one on this mesh, or out of its reach: the \
                  search begins anew",
             );
         }
         Ok(None)
+    }
+
+    /// Takes the initial design back that was set aside, where the search has not come to a better one; whether it has not.
+    pub(super) fn take_back(&mut self) -> bool {
+        let Some(initial) = self.set_aside.take() else { return false };
+        let is_better =
+            |best: &Incumbent| initial.compare(self.goal, best.objective, &best.sample) == Comparison::Better;
+        if self.best.as_ref().is_some_and(is_better) {
+            return false;
+        }
+        self.best = Some(initial);
+        self.warn(
+            "from the best design of the coarser mesh the search has come to none within the bounds that is better than the initial \
+             one",
+        );
+        true
     }
 
     /// The limit that an evaluation runs into, if it does.

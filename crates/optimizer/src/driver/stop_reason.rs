@@ -41,6 +41,18 @@ impl StopReason {
         matches!(self, Self::ObjectiveConverged | Self::StepConverged)
     }
 
+    /// Whether the search has come to its end, before any limit.
+    pub(super) fn is_of_method(self) -> bool {
+        matches!(
+            self,
+            Self::ObjectiveConverged
+                | Self::StepConverged
+                | Self::RoundoffLimited
+                | Self::MethodStalled
+                | Self::MeshLimited
+        )
+    }
+
     /// In words, for the summary.
     pub fn describe(self) -> &'static str {
         match self {

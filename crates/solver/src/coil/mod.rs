@@ -69,6 +69,12 @@ impl CoilShape {
             Self::Solid(conductor) => Some(conductor.direct_current()),
         }
     }
+
+    /// Whether an element is of the region that the coil is; an analytic coil has none.
+    pub(crate) fn flows_in(&self, element: ElementId) -> bool {
+        let current = self.region_current().map(RegionCurrent::current_density);
+        current.is_some_and(|current| current.binary_search_by_key(&element, |(e, _)| *e).is_ok())
+    }
 }
 
 impl From<Racetrack> for CoilShape {

@@ -277,12 +277,13 @@ fn images(x: Point, planes: &[MirrorPlane]) -> Vec<(Point, Point)> {
     combinations.collect()
 }
 
-/// The coils that a current flows in, with their numbers.
-fn fed(state: &FieldModel) -> impl Iterator<Item = (usize, &Coil)> {
-    state.coils().iter().enumerate().filter(|(k, coil)| {
+/// The coils that a current flows in.
+fn fed(state: &FieldModel) -> impl Iterator<Item = &Coil> {
+    let numbered = state.coils().iter().enumerate().filter(|(k, coil)| {
         let winding = state.setup().windings.get(*k).and_then(Option::as_ref);
         coil.ampere_turns != c64::default() || winding.is_some_and(|winding| winding.voltage.is_some())
-    })
+    });
+    numbered.map(|(_, coil)| coil)
 }
 
 const WOUND: &str = "a winding with a current";
@@ -294,7 +295,7 @@ fn wound_place(
     vertices: [Point; 4],
 ) -> Option<(Point, &'static str)> {
     let coils = states.iter().flat_map(fed);
-    let mut places = coils.filter_map(|(_, coil)| match &coil.shape {
+    let mut places = coils.filter_map(|coil| match &coil.shape {
         CoilShape::Racetrack(shape) => shape.wound_place(vertices),
         CoilShape::Region(_) | CoilShape::Solid(_) => None,
     });
@@ -304,9 +305,9 @@ fn wound_place(
 
 /// What there is at a point of an element but air.
 fn matter_at(state: &FieldModel, domain: &Domain, element: ElementId, x: Point) -> Option<&'static str> {
-    let is_wound = |(k, coil): (usize, &Coil)| match &coil.shape {
+    let is_wound = |coil: &Coil| match &coil.shape {
         CoilShape::Racetrack(shape) => shape.current_density(x) != [0.0; 3],
-        CoilShape::Region(_) | CoilShape::Solid(_) => state.coil_at(element) == Some(k),
+        CoilShape::Region(_) | CoilShape::Solid(_) => coil.shape.flows_in(element),
     };
     let material = state.materials()[state.topology().region_of()[element.index()].index()];
     // Of eddy currents the field is off by the square of the radius in skin depths.

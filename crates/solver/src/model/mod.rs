@@ -15,7 +15,7 @@ use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
 
 use crate::bh::BhCurve;
 use crate::circuit::{Equations, SolidRows, Solids, Windings};
-use crate::coil::{Coil, RegionCurrent};
+use crate::coil::Coil;
 use crate::discretisation::Discretisation;
 use crate::distributed::Distributed;
 use crate::element::volume::Coefficients;
@@ -251,12 +251,9 @@ impl FieldModel {
         self.weak_form.stretch_of(e).is_some()
     }
 
-    /// The coil whose region an element is in, whatever its current. An analytic coil has no faces in the mesh.
+    /// The first coil whose region an element is in, whatever its current.
     pub(crate) fn coil_at(&self, element: ElementId) -> Option<usize> {
-        self.coils().iter().position(|coil| {
-            let current = coil.shape.region_current().map(RegionCurrent::current_density);
-            current.is_some_and(|current| current.binary_search_by_key(&element, |(e, _)| *e).is_ok())
-        })
+        self.coils().iter().position(|coil| coil.shape.flows_in(element))
     }
 
     /// An element with a node that `moves` although a coil does not allow it: a winding is fixed in space, and in its window all
