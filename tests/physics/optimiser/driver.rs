@@ -103,6 +103,16 @@ fn a_design_that_gains_much_and_is_beyond_a_bound_by_little_is_taken_back_or_rep
     assert!(kept.best.objective < 0.99 * without.best.objective);
 }
 
+/// Goes on from a search of ten evaluations, as on a finer mesh.
+fn gone_on(coarser: &Optimised, problem: &mut Problem, settings: &Optimizer) -> (Optimised, Vec<String>) {
+    let design = Some(coarser.best.values.clone());
+    let start = Start { level: 1, evaluations: 10, design, ..Start::default() };
+    let (mut rows, mut notes) = (Rows::default(), Notes::default());
+    let watched = (&mut rows as _, &mut Unsupervised as _);
+    let found = optimise_from(&start, problem, &settings.settings(), &mut notes, watched, &|| false);
+    (found.unwrap_or_else(|e| panic!("{e}")), notes.0)
+}
+
 /// A tighter bound stands for a finer mesh: the best design of before has .7 % too much loss.
 #[test]
 fn where_the_best_design_of_a_coarser_mesh_is_beyond_a_bound_the_search_begins_there() {
@@ -116,23 +126,39 @@ fn where_the_best_design_of_a_coarser_mesh_is_beyond_a_bound_the_search_begins_t
     let best = coarser.best.objective / coarser.initial;
     let (mut problem, _) = of("378 W");
     for algorithm in [Algorithm::Mma, Algorithm::Ccsaq, Algorithm::Slsqp] {
-        let design = Some(coarser.best.values.clone());
-        let start = Start { level: 1, evaluations: 10, design, ..Start::default() };
-        let own = Optimizer { algorithm, max_evaluations: 15, ..settings.clone() }.settings();
-        let (mut rows, mut notes) = (Rows::default(), Notes::default());
-        let watched = (&mut rows as _, &mut Unsupervised as _);
-        let found = optimise_from(&start, &mut problem, &own, &mut notes, watched, &|| false);
-        let found = found.unwrap_or_else(|e| panic!("{e}"));
+        let own = Optimizer { algorithm, max_evaluations: 15, ..settings.clone() };
+        let (found, notes) = gone_on(&coarser, &mut problem, &own);
         let ratio = found.best.objective / found.initial;
-        println!("{algorithm:?}: {ratio:.4} for {best:.4} of the looser bound, {:#?}", notes.0);
-        let begins = notes.0.iter().any(|note| {
+        println!("{algorithm:?}: {ratio:.4} for {best:.4} of the looser bound, {notes:#?}");
+        let begins = notes.iter().any(|note| {
             note.contains("is beyond the bound of `loss_plate` by")
                 && note.contains("the search begins there")
         });
-        assert!(begins, "{:?}", notes.0);
+        assert!(begins, "{notes:?}");
         assert_eq!(found.best.violation, 0.0, "{algorithm:?}");
         // From the initial design the three evaluations that are left come to 0.64, 0.67 and 0.72.
         assert!(best < ratio && ratio < 0.62, "{algorithm:?}: {ratio} {best}");
+    }
+}
+
+/// What is minimised is bounded from below by what it is at first: nothing that keeps that is better than the initial design.
+#[test]
+fn where_nothing_better_comes_of_the_design_of_a_coarser_mesh_the_initial_one_is_the_best() {
+    let (mut problem, settings) = quick(&[]);
+    let settings = Optimizer { max_evaluations: 10, ..settings };
+    let (coarser, _) = optimised(&mut problem, &settings, &mut Silent);
+    let bound =
+        "constraints=[{ kind = \"flux_density_squared\", region = \"observation\", lower_ratio = 1 }]";
+    let (mut problem, _) = quick(&[bound]);
+    let initial = problem.shape().expect("a shape").initial().to_vec();
+    for (max_evaluations, begins_anew) in [(14, false), (100, true)] {
+        let own = Optimizer { max_evaluations, ..settings.clone() };
+        let (found, notes) = gone_on(&coarser, &mut problem, &own);
+        println!("{:?} after {}: {notes:#?}", found.stop_reason, found.evaluations);
+        assert_eq!((found.best.values, found.best.violation), (initial.clone(), 0.0));
+        let says = |words: &str| notes.iter().any(|note| note.contains(words));
+        assert!(says("has come to none within the bounds that is better than the initial one"), "{notes:?}");
+        assert_eq!(says("the search begins anew"), begins_anew, "{notes:?}");
     }
 }
 

@@ -58,11 +58,15 @@ impl Run<'_> {
         Ok(None)
     }
 
-    /// Takes the initial design back that was set aside, where the search has not come to a better one; whether it has not.
+    /// Takes the initial design back that was set aside, where the search has not come to one that is better by more than its tolerance;
+    /// whether it has not.
     pub(super) fn take_back(&mut self) -> bool {
         let Some(initial) = self.set_aside.take() else { return false };
-        let is_better =
-            |best: &Incumbent| initial.compare(self.goal, best.objective, &best.sample) == Comparison::Better;
+        let before = (initial.violation, initial.objective);
+        let is_better = |best: &Incumbent| {
+            initial.compare(self.goal, best.objective, &best.sample) == Comparison::Better
+                && best.has_gained(before, self.settings.least_gain())
+        };
         if self.best.as_ref().is_some_and(is_better) {
             return false;
         }
