@@ -44,10 +44,9 @@ impl Named {
             _ => format!("{goal} {} of {} terms", objective.worst().unwrap_or("a sum"), terms.len()),
         };
         let name = printable(&name).into_owned();
-        let unit = objective.shown_unit();
         Self {
             name,
-            unit: if unit.is_empty() { String::new() } else { format!(" {unit}") },
+            unit: objective.behind_value(),
             is_of_shape: !objective.is_of_field(),
             constraints: Vec::new(),
         }

@@ -28,8 +28,8 @@ pub(super) fn text(summary: &Summary<'_>, config: &Path) -> String {
     row("memory, about", format!("{:.0} MiB", summary.memory_estimate_bytes as f64 / (1 << 20) as f64));
     row("output", summary.output_directory.clone());
     if let Some(found) = &summary.estimate {
-        let unit = summary.objective.map_or("", Objective::shown_unit);
-        estimate(found, unit, summary.constraints, &mut row);
+        let unit = summary.objective.map(Objective::behind_value).unwrap_or_default();
+        estimate(found, &unit, summary.constraints, &mut row);
     }
     text += &region_table(summary).text();
     text += &material_table(summary).text();
@@ -59,7 +59,6 @@ fn estimate(
     constraints: &[Constraint],
     row: &mut impl FnMut(&str, String),
 ) {
-    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     if let (Some(value), Some(error), Some(bar)) =
         (found.objective, found.error_estimate, found.error_bar_relative)
     {

@@ -188,6 +188,12 @@ impl Objective {
         self.si_unit().filter(|unit| *unit != "1").unwrap_or_default()
     }
 
+    /// What stands behind its value: a blank and that unit, or nothing.
+    pub fn behind_value(&self) -> String {
+        let unit = self.shown_unit();
+        if unit.is_empty() { String::new() } else { format!(" {unit}") }
+    }
+
     /// The terms, at least one.
     pub fn terms(&self) -> &[Term] {
         match &self.sum {

@@ -72,11 +72,11 @@ fn states(data: &RunData) -> String {
     let Some(result) = &data.result else { return String::new() };
     let cases = data.config.load_cases();
     let asked_for = functionals(&data.config).into_iter().map(|(_, own)| own);
-    let taken = asked_for
+    let taken: BTreeSet<usize> = asked_for
         .filter(|own| matches!(own.kind, TargetField | Homogeneity | MultipoleContent))
-        .filter_map(|own| cases.iter().position(|case| own.is_taken_under(case)));
+        .filter_map(|own| cases.iter().position(|case| own.is_taken_under(case)))
+        .collect();
     let all = State::all(result);
-    let taken: BTreeSet<usize> = taken.collect();
     taken.into_iter().filter_map(|index| all.get(index)).map(behind_title).collect()
 }
 
