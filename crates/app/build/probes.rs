@@ -105,7 +105,8 @@ fn and_more(count: usize, how: &str) -> String {
 /// Edges of iron, of magnets and of conductors that their surfaces replace.
 ///
 /// Towards an edge of 270° of air B grows with the distance d as d^(−1/3) (Jackson, Classical Electrodynamics, 2.11); recovered in
-/// elements of size h it has what it has at h/2, in both orders that an estimate compares.
+/// elements of size h it has at most what it has at 0.6 h, in both orders that an estimate compares: beside a cube of iron in a
+/// uniform field 1.56, 1.29, 1.19 and 1.13 times as much were there at 0.08, 0.25, 0.34 and 0.42 sizes, on elements of a quarter.
 struct Edges<'a> {
     /// Without what is replaced.
     mesh: &'a Mesh,
@@ -147,7 +148,7 @@ impl<'a> Edges<'a> {
         let all: Vec<_> = probe.points.iter().zip(around).filter_map(near).collect();
         let &(point, (share, size)) = all.iter().min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
         // At the edge itself there is no number.
-        let factor = (2.0 * share).max(1e-3).powf(-1.0 / 3.0);
+        let factor = (share / 0.6).max(1e-3).powf(-1.0 / 3.0);
         Some(format!(
             "the point {}{} of the probe `{}` is {:.3} mm from an edge of iron, of a magnet or of a replaced conductor, in elements of \
              {:.3} mm: B grows without limit towards an edge, and is up to {factor:.1} times as large as what such elements have \

@@ -123,6 +123,9 @@ fn write_comparison(
     comparison: &Comparison,
 ) -> Result<ExitCode, Error> {
     comparison.write(sweep, layout)?;
+    for (row, difference) in comparison.differences() {
+        Console::stderr().warning(&format!("`{}` is not compared: {difference}", row.directory));
+    }
     if args.json {
         stdout::print_json(comparison)?;
     }
@@ -190,6 +193,13 @@ impl<'a> Session<'a> {
         workers.work(sweep, layout, &tasks, interrupted, &mut |event| self.take(event))?;
         let is_cut_short = self.codes.len() < left.len()
             || self.codes.iter().any(|code| matches!(code, ExitCode::Interrupted | ExitCode::Terminated));
+        if let Some(comparison) = &mut self.comparison
+            && comparison.differences().next().is_some()
+        {
+            // One that ended before the run that it was held against was replaced may be like all others now.
+            *comparison = Comparison::read(sweep, layout)?;
+            self.codes.extend(comparison.differences().next().map(|_| ExitCode::Files));
+        }
         let code = self.codes.iter().copied().max_by_key(|code| severity(*code));
         if let Some(comparison) = &self.comparison {
             write_comparison(self.args, sweep, layout, comparison)?;
@@ -238,6 +248,7 @@ impl<'a> Session<'a> {
             self.warning(index, &format!("{how}{error}; see {}", log.display()));
         };
         match ending {
+            Ending::NotStarted(why) => self.warning(index, &format!("not started: {why}")),
             Ending::Failed(how) => broken(&format!("failed: {how}")),
             Ending::Code(ExitCode::Interrupted | ExitCode::Terminated) => {
                 let outcome = match self.row(index)?.evaluations {

@@ -1,5 +1,6 @@
 //! What `result.json` says of how exact its objective is.
 
+use fluxmorph_optimizer::problem::ObjectiveError;
 use serde::{Deserialize, Serialize};
 
 use super::refinements::{RefinementStep, Refinements};
@@ -43,7 +44,8 @@ pub fn relative_bar(error: f64, value: f64) -> Option<f64> {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
 pub struct Accuracy {
     /// Estimated error of the ratio of a run, or of the objective of an analysis, relative to it; of a ratio at least a fiftieth of
-    /// the larger of the relative errors of its two values. `None` where there is no estimate, or no ratio.
+    /// the larger of the relative errors of its two values. Errors of elements that cancel leave a part of them in each. `None` where
+    /// there is no estimate, or no ratio.
     pub error_estimate_relative: Option<f64>,
     /// Estimated errors of the objective at the initial and at the best design, what the true value has more [its unit]; of an
     /// analysis both are the same.
@@ -149,8 +151,9 @@ impl Accuracy {
 
     /// The same with the estimated error of the objective of an analysis.
     #[must_use]
-    pub fn of_analysis(self, objective: f64, error: f64) -> Self {
-        Self { error_estimate_relative: relative(error, objective), error_estimate: Some([error; 2]), ..self }
+    pub fn of_analysis(self, objective: f64, error: ObjectiveError) -> Self {
+        let error_estimate_relative = relative(error.size, objective);
+        Self { error_estimate_relative, error_estimate: Some([error.signed; 2]), ..self }
     }
 
     /// Enters how the mesh was refined.
@@ -208,12 +211,13 @@ impl Accuracy {
     }
 
     /// Enters the estimated errors of the objective at both designs of a run; its values without them.
-    pub fn estimated(&mut self, [initial, best]: [f64; 2], errors: [f64; 2]) -> [f64; 2] {
-        let corrected = [initial + errors[0], best + errors[1]];
-        self.error_estimate = Some(errors);
+    pub fn estimated(&mut self, [initial, best]: [f64; 2], errors: [ObjectiveError; 2]) -> [f64; 2] {
+        let signed = errors.map(|error| error.signed);
+        let corrected = [initial + signed[0], best + signed[1]];
+        self.error_estimate = Some(signed);
         let of_ratio = relative(corrected[1] / corrected[0] - best / initial, best / initial);
         let of_values =
-            [(errors[0], initial), (errors[1], best)].map(|(error, value)| relative(error, value));
+            [(errors[0], initial), (errors[1], best)].map(|(error, value)| relative(error.size, value));
         let is_one_design = best == initial && errors[0] == errors[1];
         let uncancelled = if is_one_design { 0.0 } else { UNCANCELLED };
         let least = of_values.into_iter().flatten().fold(0.0, f64::max) * uncancelled;
@@ -266,6 +270,10 @@ impl Verdict {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn uncancelled(signed: f64) -> ObjectiveError {
+        ObjectiveError { signed, size: signed.abs() }
+    }
 
     fn verdict(ratio: f64, others: &[f64]) -> Option<Verdict> {
         verdict_of([3.0, 3.0 * ratio], &others.iter().map(|other| [3.0, 3.0 * other]).collect::<Vec<_>>())
@@ -324,7 +332,7 @@ mod tests {
     fn a_gain_from_near_zero_is_held_against_its_error_in_its_unit() {
         let hidden = |own: [f64; 2], errors: [f64; 2]| {
             let mut accuracy = Accuracy::default();
-            let corrected = accuracy.estimated(own, errors);
+            let corrected = accuracy.estimated(own, errors.map(uncancelled));
             accuracy.judge(own, &[corrected]);
             assert_eq!(accuracy.verdict, Some(Verdict::Confirmed));
             accuracy.hides_gain(own)
@@ -350,15 +358,22 @@ mod tests {
     #[test]
     fn errors_that_both_designs_have_alike_cancel_in_the_ratio() {
         let mut accuracy = Accuracy::default();
-        assert_eq!(accuracy.estimated([2.0, 1.0], [0.25, 0.125]), [2.25, 1.125]);
+        assert_eq!(accuracy.estimated([2.0, 1.0], [0.25, 0.125].map(uncancelled)), [2.25, 1.125]);
         assert_eq!(accuracy.error_estimate_relative, Some(0.125 * UNCANCELLED), "but for a fiftieth");
-        accuracy.estimated([2.0, 1.0], [0.0, 0.1]);
+        accuracy.estimated([2.0, 1.0], [0.0, 0.1].map(uncancelled));
         let error = accuracy.error_estimate_relative.expect("a number");
         // One rounding of each of a few operations.
         assert!((error - 0.1).abs() < 1e-15, "{error}");
-        assert_eq!(Accuracy::default().of_analysis(0.0, 1.0).error_estimate_relative, None);
+        assert_eq!(Accuracy::default().of_analysis(0.0, uncancelled(1.0)).error_estimate_relative, None);
         // Of an initial value within its error bar there is no ratio, nor one of it.
-        accuracy.estimated([2.0, 1.0], [1.25, 0.1]);
+        accuracy.estimated([2.0, 1.0], [1.25, 0.1].map(uncancelled));
         assert_eq!((accuracy.error_estimate_relative, accuracy.error_estimate), (None, Some([1.25, 0.1])));
+        // Elements whose errors cancel leave a part of theirs in the bar, and no correction.
+        let cancelled = ObjectiveError { signed: -0.001, size: 0.125 };
+        let accuracy = Accuracy::default().of_analysis(1.0, cancelled);
+        assert_eq!(
+            (accuracy.error_estimate_relative, accuracy.error_estimate),
+            (Some(0.125), Some([-0.001; 2]))
+        );
     }
 }

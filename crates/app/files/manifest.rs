@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::host::{hostname, utc_timestamp};
 use super::json::{read_json, to_json};
+use super::names::check_text;
 use super::{OutputError, RunDirectory};
 use crate::config::{Optimizer, SourceMap};
 
@@ -208,15 +209,18 @@ impl Manifest {
     }
 
     /// The same with the configuration and the overrides of the command line.
-    #[must_use]
-    pub fn reading(mut self, source: &SourceMap) -> Self {
+    ///
+    /// # Errors
+    /// [`OutputError::NoText`] for a folder whose name is none.
+    pub fn reading(mut self, source: &SourceMap) -> Result<Self, OutputError> {
+        check_text(source.directory())?;
         self.config = source.documents().first().map(|document| FileHash {
             path: document.name.clone(),
             blake3: blake3_hex(document.text.as_bytes()),
         });
         self.folder = Some(source.directory().to_owned());
         self.overrides = source.overrides().map(str::to_owned).collect();
-        self
+        Ok(self)
     }
 
     /// Adds a resumption; the run is running again.

@@ -39,7 +39,7 @@ pub use history::History;
 pub use host::{hostname, peak_memory_bytes, utc_timestamp};
 pub(crate) use json::{read_json, to_json};
 pub use manifest::{FileHash, Host, LimitsInForce, Manifest, MeshHash, Resumption, RunStatus, blake3_hex};
-pub(crate) use names::shell_word;
+pub(crate) use names::{check_text, shell_word};
 pub use names::{extend_command, resume_command, surface_files};
 pub use refinements::{RefinementStep, Refinements};
 pub use result::{
@@ -53,7 +53,7 @@ pub use state_result::{
     SaturationResult, StateErrors, StateResult,
 };
 pub use synced::SyncedLog;
-pub(crate) use synced::write_whole;
+pub(crate) use synced::{UNFINISHED, write_whole};
 
 /// Why something could not be written or read back.
 #[derive(Debug, thiserror::Error)]
@@ -118,6 +118,11 @@ pub enum OutputError {
         "`{path}` is a link to something that is missing; make that folder, remove the link, or write elsewhere with --out"
     )]
     DeadLink { path: PathBuf },
+    /// A path that is to be kept in a file has bytes that are no text.
+    #[error(
+        "`{path}` has a name that is no UTF-8 text, as which it is kept; rename it, or work from another folder"
+    )]
+    NoText { path: PathBuf },
     /// A file of a run does not hold what it should.
     #[error("`{path}` is damaged: {message}; it must be a file as fluxmorph wrote it")]
     Damaged { path: PathBuf, message: String },

@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
+use super::OutputError;
 use crate::config::MOST_EVALUATIONS;
+use crate::printable::is_hidden;
 
 /// Most characters of a surface's name in the name of its file: names of files are limited to 255 bytes.
 const LONGEST_NAME: usize = 50;
@@ -60,8 +62,25 @@ pub fn extend_command(directory: &Path, evaluations: usize) -> String {
     format!("{} --max-evaluations {more}", resume_command(directory))
 }
 
-/// A path as one word of a shell's command line.
+/// # Errors
+/// [`OutputError::NoText`] for a path that is none.
+pub(crate) fn check_text(path: &Path) -> Result<(), OutputError> {
+    path.to_str().map(|_| ()).ok_or_else(|| OutputError::NoText { path: path.to_owned() })
+}
+
+/// A path as one word of a shell's command line; bytes that are no text, or that a terminal would act on, as `bash` and its like take
+/// them between `$'` and `'`.
 pub(crate) fn shell_word(path: &Path) -> String {
+    if path.to_str().is_none_or(|text| text.contains(is_hidden)) {
+        let escaped = |byte: &u8| match byte {
+            b'\'' | b'\\' => format!("\\{}", char::from(*byte)),
+            b' '..=b'~' => char::from(*byte).to_string(),
+            other => format!("\\x{other:02x}"),
+        };
+        let bytes = path.as_os_str().as_encoded_bytes();
+        let folder = if bytes.starts_with(b"-") { "./" } else { "" };
+        return format!("$'{folder}{}'", bytes.iter().map(escaped).collect::<String>());
+    }
     // A name that begins with a dash would be taken for an option.
     let path = match path.display().to_string() {
         path if path.starts_with('-') => format!("./{path}"),
@@ -104,6 +123,8 @@ mod tests {
             ("$(rm)", "fluxmorph resume '$(rm)'"),
             ("-out", "fluxmorph resume ./-out"),
             ("", "fluxmorph resume ."),
+            ("it's \u{1b}[1m\\", r"fluxmorph resume $'it\'s \x1b[1m\\'"),
+            ("-ä\u{202e}", r"fluxmorph resume $'./-\xc3\xa4\xe2\x80\xae'"),
         ] {
             assert_eq!(resume_command(Path::new(path)), expected);
         }

@@ -11,7 +11,7 @@ use super::OutputError;
 use super::disk::{Disk, DiskFile};
 
 /// Start of the names of unfinished files.
-pub(super) const UNFINISHED: &str = ".fluxmorph-";
+pub(crate) const UNFINISHED: &str = ".fluxmorph-";
 
 /// Writes a whole file, replacing an older one.
 ///

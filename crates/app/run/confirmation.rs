@@ -9,7 +9,9 @@
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_optimizer::driver::Best;
-use fluxmorph_optimizer::problem::{Analysis, Derivatives, ErrorEstimate, NoProgress, Problem};
+use fluxmorph_optimizer::problem::{
+    Analysis, Derivatives, ErrorEstimate, NoProgress, ObjectiveError, Problem,
+};
 use fluxmorph_remesh::Moved;
 
 use super::estimate::{Estimate, Estimator, left_out};
@@ -75,7 +77,7 @@ impl InitialField {
 /// What is known of the values of a run before they are checked.
 pub(super) struct Known<'a> {
     /// Estimated errors of the objective at the initial and the best design [its unit].
-    pub(super) errors: Option<[f64; 2]>,
+    pub(super) errors: Option<[ObjectiveError; 2]>,
     /// What impedance surfaces leave out of it at both [its unit].
     pub(super) excess: Option<[f64; 2]>,
     /// Whether their estimate was cut short.
@@ -200,7 +202,7 @@ impl Session<'_> {
     /// What the facets of a run change at its initial and its best shape.
     fn facets_of_run(
         &self,
-        (objective, errors): (&ObjectiveResult, Option<[f64; 2]>),
+        (objective, errors): (&ObjectiveResult, Option<[ObjectiveError; 2]>),
         meshes: &ShapeMeshes,
         observer: &mut dyn Observer,
     ) -> Option<CurvedFacets> {
@@ -208,7 +210,7 @@ impl Session<'_> {
         let values = [objective.initial, objective.best];
         let shapes = [initial, best].into_iter().enumerate().map(|(k, mesh)| Shape {
             mesh,
-            objective: Some((values[k], errors.map(|errors| errors[k]))),
+            objective: Some((values[k], errors.map(|errors| errors[k].signed))),
             analysis: None,
         });
         let shapes: Vec<Shape<'_>> = shapes.collect();
@@ -341,7 +343,7 @@ enum Kept {
 /// which are not is reported.
 fn kept(
     tolerance: f64,
-    (errors, [of_facets, of_surfaces]): ([f64; 2], [[f64; 2]; 2]),
+    (errors, [of_facets, of_surfaces]): ([ObjectiveError; 2], [[f64; 2]; 2]),
     objective: &ObjectiveResult,
     observer: &mut dyn Observer,
 ) -> Kept {
@@ -349,7 +351,7 @@ fn kept(
     let designs = [("initial", objective.initial), ("best", larger)];
     let (mut kept, mut beyond) = (Kept::Yes, Vec::new());
     for (k, (design, scale)) in designs.into_iter().enumerate() {
-        let bar = relative_bar(errors[k], scale).unwrap_or(f64::INFINITY);
+        let bar = relative_bar(errors[k].size, scale).unwrap_or(f64::INFINITY);
         let [facets, surfaces] = [of_facets[k], of_surfaces[k]].map(|change| (change / scale).abs());
         if bar + facets + surfaces <= tolerance {
             continue;

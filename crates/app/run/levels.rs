@@ -153,7 +153,7 @@ impl<'a> Levels<'a> {
         let &Looked { problem, analysis, estimate, scale, evaluations, is_out_of_time } = looked;
         let objective = analysis.objective.unwrap_or(f64::NAN);
         let what = if evaluations == 0 { "initial" } else { "best" };
-        let Some(bar) = relative_bar(estimate.judged(), scale) else {
+        let Some(bar) = relative_bar(estimate.of_objective().size, scale) else {
             observer.warning(&format!(
                 "the objective of the {what} design is zero: accuracy.tolerance means nothing"
             ));

@@ -259,7 +259,8 @@ impl Session<'_> {
             let errors = (at_initial, at_best);
             self.enter_estimates(&mut result, (&optimised, errors), &mut recorder, observer)?;
         }
-        let errors = errors.map(|(at_initial, at_best)| [at_initial.objective, at_best.errors.objective]);
+        let errors =
+            errors.map(|(at_initial, at_best)| [at_initial.of_objective(), at_best.errors.of_objective()]);
         let shapes = ShapePair::of(config, &self.setup, &best.values)?;
         let members = [optimised.initial_members.clone(), best.analysis.member_values()];
         let meshes = ShapeMeshes { full: self.setup.full_mesh.clone(), solved, members };

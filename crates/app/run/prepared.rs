@@ -58,9 +58,9 @@ impl<'a> Prepared<'a> {
         observer: &mut dyn RunObserver,
     ) -> Result<Session<'a>, Error> {
         let Self { config, source, options, .. } = self;
+        let mut manifest = Manifest::new(command, options.threads).reading(source)?;
         let directory =
             RunDirectory::create(options.disk, &config.output.directory, options.overwrite_policy)?;
-        let mut manifest = Manifest::new(command, options.threads).reading(source);
         manifest.mesh = Some(mesh);
         manifest.tables = table_hashes(&self.setup.tables);
         manifest.ranks = options.ranks.map(RankGroup::size);

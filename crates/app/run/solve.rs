@@ -184,10 +184,10 @@ impl Session<'_> {
             return (None, Vec::new());
         }
         let objective = analysis.objective.filter(|_| self.has_field_objective());
-        let error = estimate.map(|estimate| estimate.errors.objective);
+        let error = estimate.map(|estimate| estimate.errors.of_objective());
         let shape = Shape {
             mesh: &analysis.mesh,
-            objective: objective.map(|value| (value, error)),
+            objective: objective.map(|value| (value, error.map(|error| error.signed))),
             analysis: reported::is_something(self.config, &self.setup.problem)
                 .then_some((analysis, of_states)),
         };

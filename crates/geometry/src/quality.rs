@@ -145,7 +145,7 @@ impl QualityReport {
     }
 
     /// The report that [`QualityReport::numbers`] says; the place of the worst element is to be found by
-    /// [`QualityReport::placed`].
+    /// [`QualityReport::located_on`].
     ///
     /// # Panics
     /// If there are fewer than [`QualityReport::NUMBERS`].

@@ -286,9 +286,10 @@ pub fn measure(
     }
     let least_slope = directions.iter().map(|d| d.slope).fold(f64::INFINITY, f64::min);
     let largest_error = directions.iter().map(|d| d.error).fold(0.0, f64::max);
-    // A comparison with NaN is false: a certificate that cannot be measured does not hold.
-    let holds =
-        directions.iter().all(|d| d.slope >= settings.least_slope && d.error <= settings.largest_error);
+    // Where nothing was measured nothing holds. A comparison with NaN is false: nor does what cannot be measured.
+    let is_measured = !directions.is_empty() && span.iter().any(|span| *span > 0.0);
+    let holds = is_measured
+        && directions.iter().all(|d| d.slope >= settings.least_slope && d.error <= settings.largest_error);
     Ok(Certificate { objective, directions, least_slope, largest_error, holds })
 }
 
@@ -364,6 +365,13 @@ mod tests {
         let mut missing = right;
         missing[2] = f64::NAN;
         assert!(!certify(&missing).holds);
+        // Nothing is measured without a direction, or between equal bounds.
+        let none = Settings { directions: 0, ..Settings::default() };
+        for (span, settings) in [([1.0; 3], none), ([0.0; 3], Settings::default())] {
+            let value = smooth(&p).expect("a number");
+            let measured = measure(&smooth, &p, value, &wrong, &span, &settings, |_, _| {});
+            assert!(!measured.expect("a certificate").holds, "{span:?}");
+        }
     }
 
     #[test]

@@ -345,6 +345,9 @@ impl Plan {
     }
 
     fn new(reference: &Mesh, setup: RemeshSetup) -> Result<Self, RemeshError> {
+        if let KinematicConstraint::Axis(axis @ 3..) = setup.kinematic_constraint {
+            return Err(RemeshError::Axis { axis });
+        }
         let body = Arc::new(Body::new(reference.topology(), &setup.subregions)?);
         let Body { topology, elements, .. } = &*body;
         let mut conditions = NodeConditions::new(reference, &setup, elements)?;

@@ -30,6 +30,9 @@ pub enum RemeshError {
     /// A parameter of a subregion is out of range.
     #[error("{parameter} = {value} of the remesh subregion `{subregion}`: {expected}")]
     Parameter { subregion: String, parameter: &'static str, value: f64, expected: &'static str },
+    /// A motion along no coordinate axis.
+    #[error("nodes are to move along the axis {axis}: expected 0, 1 or 2")]
+    Axis { axis: usize },
     /// A design node is no node of the remesh region.
     #[error(
         "design node {node} at {} is not in the remesh region: enlarge the region so that it holds the elements around every \

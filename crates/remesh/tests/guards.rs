@@ -4,8 +4,8 @@
 use crate::support::{Point, at, nodes_where, shaken, unit_cells, whole};
 use fluxmorph_geometry::{Mesh, MeshError};
 use fluxmorph_remesh::{
-    ElasticMap, Motion, RemeshError, RemeshSetup, SolverChoice, StiffnessPolicy, Subregion, check_step,
-    step_to_inversion,
+    ElasticMap, KinematicConstraint, Motion, MotionLaw, RemeshError, RemeshSetup, SolverChoice,
+    StiffnessPolicy, Subregion, check_step, step_to_inversion,
 };
 
 const SOLVERS: [SolverChoice; 2] = [SolverChoice::Direct, SolverChoice::ComponentBlocks];
@@ -33,6 +33,19 @@ fn motion(solver: SolverChoice) -> Motion {
 
 fn top(motion: &Motion, by: Point) -> Vec<Point> {
     at(motion.original(), motion.map().design_nodes(), |_| by)
+}
+
+#[test]
+fn an_axis_that_is_none_is_refused() {
+    let mesh = mesh();
+    for axis in [3, 64, usize::MAX] {
+        let sound = setup(&mesh, SolverChoice::Direct, whole(&mesh));
+        let along = KinematicConstraint::Axis(axis);
+        let error = ElasticMap::new(&mesh, RemeshSetup { kinematic_constraint: along, ..sound.clone() });
+        assert!(matches!(error, Err(RemeshError::Axis { .. })), "{axis}");
+        let error = Motion::new(mesh.clone(), RemeshSetup { law: MotionLaw::Rails(axis), ..sound });
+        assert!(matches!(error, Err(RemeshError::Axis { .. })), "{axis}");
+    }
 }
 
 #[test]

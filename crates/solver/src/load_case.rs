@@ -27,7 +27,7 @@ pub struct LoadCase {
     pub name: Option<String>,
     /// Frequency [Hz]; zero for magnetostatics.
     pub frequency: f64,
-    /// By the coils of the set-up, in their order.
+    /// By the coils of the set-up, in their order, one for each.
     pub drives: Vec<Drive>,
 }
 
@@ -88,7 +88,8 @@ impl FieldModel {
         self.is_linear() && Arc::ptr_eq(self.form(), other.form())
     }
 
-    /// A prepared system of a problem with the same matrix, with the circuits of this one.
+    /// A prepared system of a problem with the same matrix, with the circuits of this one. [`FieldModel::shares_matrix_with`] says whether
+    /// it is that; it is not looked at here.
     ///
     /// # Errors
     /// As [`PreparedSystem::solve_field`], for coils that a voltage drives here and not there.

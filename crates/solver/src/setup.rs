@@ -1,15 +1,17 @@
 //! What a field problem is made from beside the mesh, and what is refused of it before anything is computed.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use fluxmorph_geometry::parallel::Ownership;
 use fluxmorph_geometry::tet4::Point;
+use fluxmorph_geometry::topology::face_key;
 use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::bh::BhCurve;
 use crate::boundary::{self, Boundary};
 use crate::circuit::{Winding, solids};
-use crate::coil::{Coil, Condition, ConditionedSurface, planes};
+use crate::coil::{Coil, CoilShape, Condition, ConditionedSurface, RegionFault, planes};
 use crate::elements::{ElementFamily, Order};
 use crate::error::SolverError;
 use crate::linear::{DistributedSettings, LinearSolverSettings};
@@ -136,28 +138,102 @@ pub(crate) fn check(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverEr
         return refuse("frequency", setup.frequency, "0 Hz: a permanent magnet makes a static field");
     }
     check_laws(mesh, setup)?;
+    check_coil_numbers(setup)?;
+    check_conduction(mesh, setup)?;
     check_solids(setup)?;
-    for conductor in &setup.conductors {
-        if conductor.surface.is_empty() {
-            return Err(SolverError::EmptyRegion {
-                region: conductor.name.clone(),
-                expected: "the surface that replaces a conductor needs faces",
-            });
-        }
-    }
+    check_replaced(&setup.conductors)?;
     let perfect = setup.conductors.iter().filter(|conductor| conductor.law == SurfaceLaw::Perfect);
     let perfect = perfect.map(|conductor| (conductor.name.as_str(), conductor.surface.as_slice()));
     boundary::check_applied(mesh, &setup.boundaries, perfect)
 }
 
-/// Refuses solid conductors where they cannot be solved with.
+/// Refuses surfaces of conductors without faces, or with one that would count twice.
+fn check_replaced(conductors: &[Conductor]) -> Result<(), SolverError> {
+    let mut known = HashSet::new();
+    for Conductor { name, surface, .. } in conductors {
+        if surface.is_empty() {
+            let expected = "the surface that replaces a conductor needs faces";
+            return Err(SolverError::EmptyRegion { region: name.clone(), expected });
+        }
+        if let Some(face) = surface.iter().find(|face| !known.insert(face_key(**face))) {
+            let nodes = face.map(|node| node.index());
+            let what = format!("face of the surface of `{name}`");
+            return Err(SolverError::parameter(what, format!("{nodes:?}"), "each face once"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses currents and windings with numbers out of range.
+fn check_coil_numbers(setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let refuse =
+        |what: String, value: String, expected: &str| Err(SolverError::parameter(what, value, expected));
+    let (coils, windings) = (setup.coils.len(), setup.windings.len());
+    if windings > coils {
+        return refuse("number of windings".to_owned(), windings.to_string(), "at most one a coil");
+    }
+    let is_static = setup.frequency == 0.0;
+    for (k, Coil { name, ampere_turns, .. }) in setup.coils.iter().enumerate() {
+        let winding = setup.windings.get(k).copied().flatten();
+        let voltage = winding.and_then(|winding| winding.voltage).unwrap_or_default();
+        for (what, value) in [("ampere_turns", *ampere_turns), ("voltage", voltage)] {
+            if is_static && value.im != 0.0 {
+                return refuse(format!("{what} of `{name}`"), value.to_string(), "a real number at 0 Hz");
+            }
+        }
+        if !voltage.is_finite() {
+            return refuse(format!("voltage of `{name}`"), voltage.to_string(), "a finite phasor");
+        }
+        let Some(Winding { turns, resistance, series_inductance, series_capacitance, .. }) = winding else {
+            continue;
+        };
+        let capacitance = series_capacitance.unwrap_or(1.0);
+        for (what, value, is_in_range, expected) in [
+            ("turns", turns, turns > 0.0, "a positive number"),
+            ("resistance", resistance, resistance >= 0.0, "zero or more ohms"),
+            ("series_inductance", series_inductance, series_inductance >= 0.0, "zero or more henries"),
+            ("series_capacitance", capacitance, capacitance > 0.0, "a positive number of farads"),
+        ] {
+            if !(is_in_range && value.is_finite()) {
+                return refuse(format!("{what} of `{name}`"), value.to_string(), expected);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Refuses stranded windings that conduct above 0 Hz: eddy currents would flow through all turns.
+fn check_conduction(mesh: &Mesh, setup: &FieldModelSetup) -> Result<(), SolverError> {
+    let topology = mesh.topology();
+    let stranded = setup.coils.iter().filter_map(|coil| match &coil.shape {
+        CoilShape::Region(current) if setup.frequency > 0.0 => Some((coil, current)),
+        _ => None,
+    });
+    for (coil, current) in stranded {
+        let regions = current.current_density().iter().map(|(e, _)| topology.region_of()[e.index()].index());
+        let conductivity = regions.map(|region| setup.materials[region].conductivity).find(|own| *own > 0.0);
+        if let Some(conductivity) = conductivity {
+            let what = format!("conductivity of the winding `{}`", coil.name);
+            return Err(SolverError::parameter(what, conductivity, "zero above 0 Hz, or a solid conductor"));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses solid conductors where they cannot be solved with: over ranks, and where another coil is of the same elements, whose
+/// current one of the two would not see.
 fn check_solids(setup: &FieldModelSetup) -> Result<(), SolverError> {
-    let Some((coil, _)) = solids::conductors(&setup.coils).next().filter(|_| setup.frequency > 0.0) else {
-        return Ok(());
-    };
-    let coil = &setup.coils[coil].name;
-    if setup.ownership.is_some() {
-        return Err(SolverError::SolidOnRanks { coil: coil.clone() });
+    for (coil, conductor) in solids::conductors(&setup.coils).filter(|_| setup.frequency > 0.0) {
+        let name = setup.coils[coil].name.clone();
+        if setup.ownership.is_some() {
+            return Err(SolverError::SolidOnRanks { coil: name });
+        }
+        let mut others = setup.coils.iter().enumerate().filter(|(k, _)| *k != coil).map(|(_, other)| other);
+        let flows = |other: &&Coil| conductor.potential().iter().any(|(e, _)| other.shape.flows_in(*e));
+        if let Some(other) = others.find(flows) {
+            let fault = RegionFault::Shared { other: other.name.clone() };
+            return Err(SolverError::CoilRegion { coil: name, fault });
+        }
     }
     Ok(())
 }

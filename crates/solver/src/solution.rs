@@ -98,7 +98,7 @@ impl FieldSolution {
         self.newton_steps
     }
 
-    /// The unknowns, one per equation, then one per solid conductor.
+    /// The unknowns, one per equation, then one per segment of a solid conductor above 0 Hz.
     pub fn values(&self) -> &[c64] {
         &self.values
     }

@@ -16,8 +16,14 @@ impl FieldModel {
     /// Solves the state problem on a mesh; also returns the prepared system for the adjoint.
     ///
     /// # Errors
-    /// [`SolverError`] when the factorisation or the iteration fails.
+    /// [`SolverError`] for a mesh of another size than that of the set-up, and when the factorisation or the iteration fails.
     pub fn solve(&self, mesh: &Mesh) -> Result<(FieldSolution, PreparedSystem), SolverError> {
+        let [own, others] = [self.topology(), mesh.topology()].map(|of| (of.node_count(), of.tets().len()));
+        if own != others {
+            let expected = format!("{} and {}, as the mesh of the set-up has", own.0, own.1);
+            let value = format!("{} and {}", others.0, others.1);
+            return Err(SolverError::parameter("number of nodes and tetrahedra", value, &expected));
+        }
         if !self.is_linear() {
             return self.solve_nonlinear(mesh, (&mut LinearSolverCache::default(), None), &mut |_| {});
         }

@@ -3,13 +3,14 @@
 
 use crate::{OUTSIDE, STEEL, flux_parallel, lines, on_threads, painted};
 use fluxmorph_geometry::fem::{CsrMatrix, c64};
-use fluxmorph_geometry::{Mesh, MeshError};
+use fluxmorph_geometry::{Mesh, MeshError, NodeId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack};
 use fluxmorph_solver::linear::{
     LinearSolver, LinearSolverCache, LinearSolverSettings, Method, Reuse, SolverEvent,
 };
 use fluxmorph_solver::{
-    ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Material, NonConvergence, SolverError,
+    Conductor, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Material, NonConvergence,
+    SolverError, SurfaceLaw, Winding,
 };
 
 /// A steel plate under a coil, some hundred nodes.
@@ -362,6 +363,52 @@ fn material_data_out_of_range_are_refused_by_name() {
         let error = FieldModel::new(&mesh, setup).expect_err("out of range").to_string();
         assert!(error.contains(name), "{error}");
     }
+}
+
+/// Each would be a field, and a wrong one.
+#[test]
+fn currents_windings_and_surfaces_that_cannot_be_are_refused_by_name() {
+    type Change = fn(&mut FieldModelSetup, &mut Winding);
+    let mesh = mesh();
+    for (change, name) in [
+        ((|own, _| own.frequency = 0.0) as Change, "ampere_turns of `coil` = 1+1i"),
+        (|_, winding| winding.turns = 0.0, "turns of `coil` = 0"),
+        (|_, winding| winding.resistance = -1.0, "resistance of `coil` = -1"),
+        (|_, winding| winding.series_inductance = f64::NAN, "series_inductance of `coil` = NaN"),
+        (|_, winding| winding.series_capacitance = Some(0.0), "series_capacitance of `coil` = 0"),
+        (|_, winding| winding.voltage = Some(c64::new(f64::NAN, 0.0)), "voltage of `coil` = NaN"),
+        (|own, _| own.coils.clear(), "number of windings = 1"),
+        (
+            |own, _| {
+                let surface =
+                    vec![[0, 1, 8], [8, 0, 1]].into_iter().map(|face| face.map(NodeId::new)).collect();
+                own.conductors.push(Conductor {
+                    name: "twice".to_owned(),
+                    surface,
+                    law: SurfaceLaw::Perfect,
+                });
+            },
+            "face of the surface of `twice`",
+        ),
+    ] {
+        let mut setup = setup(fixed(Method::Direct), c64::new(1.0, 1.0), STEEL);
+        let mut winding = Winding {
+            turns: 10.0,
+            resistance: 1.0,
+            series_inductance: 0.0,
+            series_capacitance: None,
+            voltage: None,
+        };
+        change(&mut setup, &mut winding);
+        setup.windings = vec![Some(winding)];
+        let error = FieldModel::new(&mesh, setup).expect_err("out of range").to_string();
+        assert!(error.contains(name), "{error}");
+    }
+    let model =
+        FieldModel::new(&mesh, setup(fixed(Method::Direct), c64::new(1.0, 0.0), STEEL)).expect("sound");
+    let other = painted([6, 6, 9].map(|n| lines(n, 0.01)), &["air", "plate"], |_| 0);
+    let error = model.solve(&other).expect_err("another topology").to_string();
+    assert!(error.contains("number of nodes and tetrahedra"), "{error}");
 }
 
 /// What a first solution leaves for the next.

@@ -72,6 +72,39 @@ fn a_broken_task_is_resumed_and_a_changed_sweep_refused() {
         .with(5, &["is not the directory of this sweep"]);
 }
 
+/// Each is a sound run by itself.
+#[test]
+fn runs_of_other_inputs_are_told_and_not_compared() {
+    let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
+    let home = Home::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
+    home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
+    let set = ["--set", "design.upper=2 mm,3 mm,4 mm", "--max-evaluations", "1"];
+    home.sweep("out", &[&set[..], &["--script", "sweep.sh"]].concat()).with(0, &[]);
+    task(&home, 0).with(1, &[": begun"]);
+    home.edit("iron.csv", "0.5", "0.4");
+    task(&home, 1).with(1, &[": begun"]);
+    let other = ["--set", "design.upper=4 mm", "--set", "analysis.frequency=60 Hz"];
+    let run = ["run", "block.toml", "--out", "out/design.upper=4mm", "--max-evaluations", "1"];
+    home.edit("iron.csv", "0.4", "0.5");
+    home.fluxmorph(&[&run[..], &other].concat()).with(1, &[]);
+    let compared = home.sweep("out", &[&set[..], &["--compare"]].concat()).with(
+        0,
+        &[
+            "`design.upper=3mm` is not compared: `",
+            "iron.csv` was another file when it began than for `design.upper=2mm`",
+            "`design.upper=4mm` is not compared: its configuration is another",
+        ],
+    );
+    assert_eq!(compared.count("is not compared"), 2, "{}", compared.stderr);
+    let table = home.text("out/sweep.csv");
+    let [first, second, third] = [1, 2, 3].map(|k| table.lines().nth(k).expect("a row").to_owned());
+    assert!(first.starts_with("2 mm,stopped,max_evaluations,1,"), "{table}");
+    assert!(second.starts_with("3 mm,stopped,,,,"), "{table}");
+    assert!(third.starts_with("4 mm,stopped,,,,"), "{table}");
+    let page = home.text("out/sweep.html");
+    assert!(page.contains("not compared: its configuration is another"), "{page}");
+}
+
 #[test]
 fn a_file_of_others_is_no_place_for_the_script() {
     let home = Home::with(&[("max_evaluations = 6", "max_evaluations = 1")]);

@@ -133,6 +133,25 @@ fn what_is_no_sweep_is_refused_with_the_reason() {
         .with(5, &["cannot read the configuration `none.toml`"]);
 }
 
+#[cfg(target_os = "linux")]
+#[test]
+fn a_folder_whose_name_is_no_text_is_refused_before_anything_is_written() {
+    use std::os::unix::ffi::OsStrExt;
+    let home = Home::new();
+    let odd = home.path("").join(std::ffi::OsStr::from_bytes(b"latin-1 \xe4"));
+    let sweep = ["sweep", "block.toml", "--set", "design.upper=2 mm,3 mm"];
+    finish(home.command(&sweep).arg("--out").arg(&odd)).with(5, &["no UTF-8 text", "rename it"]);
+    assert!(!odd.exists());
+    std::fs::create_dir(&odd).expect("made");
+    std::fs::copy(home.path("block.toml"), odd.join("block.toml")).expect("copied");
+    for command in ["run", "solve"] {
+        finish(home.command(&[command, "block.toml", "--out", "out"]).current_dir(&odd))
+            .with(5, &["no UTF-8 text", "rename it"]);
+    }
+    finish(home.command(&sweep[..2]).current_dir(&odd)).with(5, &["no UTF-8 text"]);
+    assert_eq!(std::fs::read_dir(&odd).expect("a folder").count(), 1);
+}
+
 #[test]
 fn a_folder_of_others_is_left_alone() {
     let home = Home::new();

@@ -148,6 +148,12 @@ fn one_that_fails_ends_no_other_and_the_worst_code_counts() {
     assert!(page.contains("href=\"logs/design.surface%3Dnowhere.log\""), "{page}");
     assert!(!page.contains("href=\"design.surface%3Dnowhere/"), "{page}");
     assert!(home.text("out/sweep.html").contains("1 of 2 combinations have ended"));
+    // A log that cannot be written is a fault of files; what a sweep that was killed left is removed.
+    std::fs::create_dir_all(home.path("held/logs/design.upper=2mm.log")).expect("made");
+    home.write("held/.fluxmorph-1-sweep.html", "");
+    let set = ["--set", "design.upper=2 mm,3 mm", "--max-evaluations", "1"];
+    home.sweep("held", &set).with(5, &["design.upper=2mm: not started: cannot write `", "3mm: stopped"]);
+    assert!(!home.path("held/.fluxmorph-1-sweep.html").exists());
     // All converge: the lower bound of the change is one that any step keeps.
     let converged = ["--set", "optimizer.ftol_rel=0.9,0.8", "--max-evaluations", "20"];
     home.sweep("converged", &converged).with(0, &[": converged, F/F0"]);

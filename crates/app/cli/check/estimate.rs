@@ -89,12 +89,12 @@ pub(super) fn of_initial_design(
         error_estimate: error,
     });
     let constraints = constraints.collect();
-    let error = estimated.map(|errors| errors.objective).filter(|_| is_of_field);
+    let error = estimated.map(|errors| errors.of_objective()).filter(|_| is_of_field);
     let error_bar_relative =
-        analysis.objective.zip(error).and_then(|(value, error)| relative_bar(error, value));
+        analysis.objective.zip(error).and_then(|(value, error)| relative_bar(error.size, value));
     Ok(EstimateSummary {
         objective: analysis.objective,
-        error_estimate: error,
+        error_estimate: error.map(|error| error.signed),
         error_bar_relative,
         constraints,
         notices,

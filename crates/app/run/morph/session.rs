@@ -52,9 +52,9 @@ pub fn morph(
     // An earlier run is replaced only by one that can begin.
     jobs.iter().try_for_each(|job| check_body(&job.setup))?;
     warn(config, parameters, &jobs, observer);
+    let mut manifest = Manifest::new("morph", options.threads).reading(source)?;
     let directory =
         RunDirectory::create_flat(options.disk, &config.output.directory, options.overwrite_policy)?;
-    let mut manifest = Manifest::new("morph", options.threads).reading(source);
     manifest.mesh = jobs.first().map(|job| mesh_hash(job.config, &job.setup.mesh));
     manifest.write(&directory)?;
     let session = Session { config, source, parameters, jobs, directory, options, clock };

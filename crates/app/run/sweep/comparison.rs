@@ -1,5 +1,6 @@
 //! What the runs of a sweep have found, side by side: `sweep.csv`, and the numbers of the page.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde::Serialize;
@@ -9,7 +10,7 @@ use super::{Criterion, Layout, Planned, Sweep, front, page, state};
 use crate::config::Goal;
 use crate::error::Error;
 use crate::files::{
-    Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, Verdict, csv_text,
+    FileHash, Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, Verdict, csv_text,
 };
 use crate::run::journal::Journal;
 
@@ -69,6 +70,12 @@ pub struct Row {
     /// Evaluation and ratio, as they came.
     #[serde(skip)]
     pub(super) curve: Vec<[f64; 2]>,
+    /// Mesh and tables that it has read from files.
+    #[serde(skip)]
+    pub(super) inputs: Vec<FileHash>,
+    /// Why it is no run of this sweep, and has none of its numbers here; `None` where it is one.
+    #[serde(skip)]
+    pub(super) difference: Option<String>,
     /// What there is to read about the run, relative to the sweep, and what it is called.
     #[serde(skip)]
     pub(super) file: Option<(String, &'static str)>,
@@ -101,8 +108,42 @@ impl Comparison {
         Ok(())
     }
 
+    /// The runs that are not compared, and why.
+    pub fn differences(&self) -> impl Iterator<Item = (&Row, &str)> {
+        self.combinations.iter().filter_map(|row| Some((row, row.difference.as_deref()?)))
+    }
+
+    /// Takes the numbers from runs of another configuration, and from those that have read another content of a file than the first
+    /// run that read it: the file was changed meanwhile.
+    fn leave_out_others(&mut self) {
+        let mut known: BTreeMap<String, (String, String)> = BTreeMap::new();
+        for row in &mut self.combinations {
+            for FileHash { path, blake3 } in &row.inputs {
+                let (first, directory) =
+                    known.entry(path.clone()).or_insert_with(|| (blake3.clone(), row.directory.clone()));
+                if first != blake3 && row.difference.is_none() {
+                    row.difference =
+                        Some(format!("`{path}` was another file when it began than for `{directory}`"));
+                }
+            }
+            if row.difference.is_some() {
+                *row = Row {
+                    curve: Vec::new(),
+                    values: std::mem::take(&mut row.values),
+                    directory: std::mem::take(&mut row.directory),
+                    inputs: std::mem::take(&mut row.inputs),
+                    difference: row.difference.take(),
+                    file: row.file.take(),
+                    status: row.status,
+                    ..Row::default()
+                };
+            }
+        }
+    }
+
     /// Finds what only all rows together say.
     fn compare(&mut self) {
+        self.leave_out_others();
         self.best = self.find_best();
         let points: Vec<(usize, [f64; 2])> =
             self.points().filter(|(row, _)| self.combinations[*row].violated.is_empty()).collect();
@@ -217,6 +258,12 @@ impl Row {
         };
         let manifest = Manifest::read(&run)?;
         let curve = curve(&run)?;
+        let is_configured = run.holds_configuration();
+        let other = || is_configured.then(|| state::configured(&run, &manifest, planned).err()).flatten();
+        let difference = state::other_command(&manifest).or_else(other);
+        // A mesh that is generated may differ from run to run.
+        let mesh = manifest.mesh.as_ref().filter(|_| planned.mesh.is_some());
+        let mesh = mesh.map(|mesh| FileHash { path: mesh.origin.clone(), blake3: mesh.blake3.clone() });
         let result = state::result(&run, &manifest);
         let objective = result.as_ref().and_then(|result| result.objective.as_ref());
         let of_result = |value: fn(&RunResult) -> Option<f64>| result.as_ref().and_then(value);
@@ -235,6 +282,12 @@ impl Row {
             seconds: of_result(|result| result.timings_s.get("total").copied()),
             peak_memory_bytes: result.as_ref().map(|result| result.peak_memory_bytes),
             violated: result.as_ref().map_or(Vec::new(), RunResult::violated),
+            inputs: if difference.is_none() {
+                mesh.into_iter().chain(manifest.tables).collect()
+            } else {
+                Vec::new()
+            },
+            difference,
             file: Some(if is_file(layout, &run.report()) {
                 (format!("{}/report.html", blank.directory), "report")
             } else {

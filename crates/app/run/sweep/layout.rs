@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::{Planned, Setting, Sweep, SweepError};
 use crate::error::Error;
 use crate::files::{
-    Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, check_place, read_json,
-    shell_word, to_json, write_whole,
+    Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, UNFINISHED, check_place,
+    read_json, shell_word, to_json, write_whole,
 };
 
 /// The mark by which a directory is known as ours.
@@ -76,6 +76,7 @@ impl Layout {
         layout.acquire(Sharing::Exclusive)?;
         // Another process may have come and gone between the look and the lock.
         layout.check_free(sweep)?;
+        layout.remove_unfinished()?;
         let logs = layout.path.join(LOGS);
         if disk.is_link(&logs) {
             return Err(OutputError::Linked { path: logs }.into());
@@ -92,6 +93,16 @@ impl Layout {
     pub fn acquire(&mut self, sharing: Sharing) -> Result<(), OutputError> {
         let locked = self.disk.lock(&self.path.join(LOCK), sharing);
         self.lock = locked.map_err(OutputError::io("lock", &self.path))?.map(Arc::from);
+        Ok(())
+    }
+
+    /// Removes what a sweep that was killed had not written to its end.
+    fn remove_unfinished(&self) -> Result<(), OutputError> {
+        let names = self.disk.names(&self.path).map_err(OutputError::io("read", &self.path))?;
+        for name in names.iter().filter(|name| name.starts_with(UNFINISHED) && *name != LOCK) {
+            let path = self.path.join(name);
+            self.disk.remove(&path).map_err(OutputError::io("remove", &path))?;
+        }
         Ok(())
     }
 
@@ -169,7 +180,7 @@ impl Layout {
 
     /// Whether there is nothing of others in the folder.
     fn is_free(&self) -> Result<(), Error> {
-        let unfinished = |name: &String| name.starts_with(".fluxmorph-") || name == LOGS;
+        let unfinished = |name: &String| name.starts_with(UNFINISHED) || name == LOGS;
         match self.disk.names(&self.path) {
             Ok(names) if names.iter().all(unfinished) => Ok(()),
             Ok(_) => Err(SweepError::NotASweep { path: self.path.clone() }.into()),

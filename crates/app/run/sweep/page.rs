@@ -112,6 +112,9 @@ impl Row {
         if self.verdict == Some(Verdict::NotConfirmed) {
             words += ", gain not confirmed";
         }
+        if let Some(difference) = &self.difference {
+            words += &format!(", not compared: {difference}");
+        }
         words
     }
 
@@ -206,5 +209,7 @@ mod tests {
         let doubtful =
             Row { violated: vec!["mass".to_owned()], verdict: Some(Verdict::NotConfirmed), ..ended };
         assert_eq!(doubtful.describe(), "converged, violates mass, gain not confirmed");
+        let other = Row { difference: Some("it is another".to_owned()), ..Row::default() };
+        assert_eq!(other.describe(), "not begun, not compared: it is another");
     }
 }

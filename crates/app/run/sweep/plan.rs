@@ -12,7 +12,7 @@ use crate::config::{
     Config, ConfigError, Diagnostic, DiagnosticReport, Objective, OutputNamedBy, SourceMap, resolved_toml,
 };
 use crate::error::Error;
-use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex};
+use crate::files::{FileHash, LimitsInForce, OverwritePolicy, blake3_hex, check_text};
 use crate::run::RunLimits;
 
 /// Combinations whose faults are shown; the rest are counted.
@@ -125,13 +125,17 @@ impl Sweep {
         }
         faulty.check(planned.len())?;
         let (config, source) = first.expect("a product has at least one combination");
+        let directory = request.out.map_or_else(|| beside(&config.output.directory), Path::to_owned);
+        // The commands of the runs are text.
+        check_text(request.config)?;
+        check_text(&directory)?;
         Ok(Self {
             config: FileHash {
                 path: request.config.display().to_string(),
                 blake3: blake3_hex(source.text().as_bytes()),
             },
             title: config.title,
-            directory: request.out.map_or_else(|| beside(&config.output.directory), Path::to_owned),
+            directory,
             settings,
             limits: request.limits,
             outside: request.outside,

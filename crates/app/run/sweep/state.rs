@@ -74,19 +74,16 @@ impl<'a> States<'a> {
             return Ok(State::InUse);
         }
         let manifest = Manifest::read(&run)?;
-        if manifest.command != "run" {
-            return Ok(State::Other(format!("it holds a `{}`", manifest.command)));
+        if let Some(difference) = other_command(&manifest) {
+            return Ok(State::Other(difference));
         }
         if !run.holds_configuration() && !names.iter().any(|name| run.journal().ends_with(name)) {
             return Ok(State::Unstarted);
         }
-        let (config, source) = match run::configuration(&run, &manifest) {
+        let (config, source) = match configured(&run, &manifest, planned) {
             Ok(read) => read,
-            Err(error) => return Ok(State::Other(error.to_string())),
+            Err(difference) => return Ok(State::Other(difference)),
         };
-        if fingerprint(&config) != planned.fingerprint {
-            return Ok(State::Other("its configuration is another".to_owned()));
-        }
         let other_mesh = || State::Other("its mesh file is another, or has changed since".to_owned());
         let is_here = mesh_file(&config) == planned.mesh.as_deref();
         Ok(match result(&run, &manifest).filter(|_| has_ended(&manifest)) {
@@ -129,6 +126,24 @@ impl<'a> States<'a> {
             self.disk.read(Path::new(path), LARGEST_TABLE).is_ok_and(|bytes| blake3_hex(&bytes) == *blake3)
         };
         *self.files.entry((PathBuf::from(path), blake3.clone())).or_insert_with(is_that)
+    }
+}
+
+/// What a directory holds that is no run.
+pub(super) fn other_command(manifest: &Manifest) -> Option<String> {
+    (manifest.command != "run").then(|| format!("it holds a `{}`", manifest.command))
+}
+
+/// The configuration of the run of a combination, or why it is no such run.
+pub(super) fn configured(
+    run: &RunDirectory,
+    manifest: &Manifest,
+    planned: &Planned,
+) -> Result<(Config, SourceMap), String> {
+    let read = run::configuration(run, manifest).map_err(|error| error.to_string())?;
+    match fingerprint(&read.0) == planned.fingerprint {
+        true => Ok(read),
+        false => Err("its configuration is another".to_owned()),
     }
 }
 

@@ -42,6 +42,8 @@ pub struct Workers {
 pub enum Ending {
     /// By itself, with a code of the documentation.
     Code(ExitCode),
+    /// It did not begin: its log cannot be written, or the program not be started.
+    NotStarted(String),
     /// In another way, described in words.
     Failed(String),
 }
@@ -111,7 +113,7 @@ impl Workers {
                 match self.start(sweep, layout, &sweep.combinations[index], task) {
                     Ok(child) => running.push(Running { index, child }),
                     Err(error) => {
-                        continues &= deliver(Event::Ended(index, Ending::Failed(error.to_string())));
+                        continues &= deliver(Event::Ended(index, Ending::NotStarted(error.to_string())));
                     }
                 }
             }
@@ -198,6 +200,7 @@ impl Ending {
     pub fn code(&self) -> ExitCode {
         match self {
             Self::Code(code) => *code,
+            Self::NotStarted(_) => ExitCode::Files,
             Self::Failed(_) => ExitCode::Numerical,
         }
     }

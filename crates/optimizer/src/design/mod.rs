@@ -21,7 +21,7 @@ mod transfer;
 
 use std::collections::BTreeSet;
 
-use fluxmorph_geometry::tet4::{Point, dot};
+use fluxmorph_geometry::tet4::{Point, dot, norm};
 use fluxmorph_geometry::{Mesh, NodeId, millimetres};
 
 pub use filter::{cell_size, default_filter_radius};
@@ -32,6 +32,9 @@ pub use transfer::{SurfaceMismatch, Triangulation};
 
 /// Weights of the variables at one node, ascending by variable.
 type Row = Vec<(usize, f64)>;
+
+/// How far the length of a unit vector may be from one.
+const ROUNDING: f64 = 1e-9;
 
 /// The way a positive variable moves the nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,6 +123,32 @@ impl DesignSetup {
     }
 }
 
+impl DesignSetup {
+    /// # Errors
+    /// [`DesignError::Parameter`].
+    fn check(&self) -> Result<(), DesignError> {
+        let refuse = |what, value, expected| Err(DesignError::Parameter { what, value, expected });
+        if let Direction::Along(direction) = self.direction {
+            let length = norm(direction);
+            if length.is_nan() || (length - 1.0).abs() > ROUNDING {
+                return refuse("the length of the direction", length, "a unit vector");
+            }
+        }
+        if let Some(mirror) = self.mirrors.iter().find(|mirror| mirror.axis > 2 || !mirror.at.is_finite()) {
+            return refuse("the place of a mirror", mirror.at, "a number on one of the axes 0, 1, 2");
+        }
+        match self.control {
+            Control::Filter(radius) if !(radius > 0.0 && radius.is_finite()) => {
+                refuse("the radius of the filter", radius, "a positive length")
+            }
+            Control::Grid([a, b]) if a.min(b) < 2 => {
+                refuse("the number of points of the grid along one side", a.min(b) as f64, "at least 2")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Why a surface cannot carry the design variables asked for.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -128,6 +157,9 @@ pub enum DesignError {
     /// No triangle.
     #[error("the design surface has no triangles")]
     Empty,
+    /// A number out of range.
+    #[error("{what} is {value}: expected {expected}")]
+    Parameter { what: &'static str, value: f64, expected: &'static str },
     /// The grid's rectangle has no area.
     #[error("a control grid cannot be laid across the direction: the surface has no extent along {axis}")]
     NoExtent { axis: char },
@@ -202,6 +234,7 @@ impl DesignSurface {
         if nodes.is_empty() {
             return Err(DesignError::Empty);
         }
+        setup.check()?;
         let places: Vec<Point> = nodes.iter().map(|&n| mesh.point(n)).collect();
         let (mut directions, mut mitres) = match setup.direction {
             Direction::Along(direction) => (vec![direction; nodes.len()], vec![1.0; nodes.len()]),
@@ -367,5 +400,7 @@ impl DesignSurface {
     }
 }
 
+#[cfg(test)]
+mod refusals;
 #[cfg(test)]
 mod tests;

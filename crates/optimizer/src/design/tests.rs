@@ -55,7 +55,7 @@ pub(super) fn quarter(mesh: &Mesh, direction: Direction, control: Control) -> De
     }
 }
 
-const UP: Direction = Direction::Along([0.0, 0.0, 1.0]);
+pub(super) const UP: Direction = Direction::Along([0.0, 0.0, 1.0]);
 
 pub(super) fn build(mesh: &Mesh, setup: &DesignSetup) -> DesignSurface {
     DesignSurface::new(mesh, setup).unwrap_or_else(|e| panic!("{e}"))
@@ -357,19 +357,6 @@ fn a_fixed_boundary_stays_except_on_symmetry_planes() {
             assert!((h - expected).abs() < 1e-14, "{x:?}: {h}");
         }
     }
-}
-
-#[test]
-fn a_grid_over_a_surface_that_turns_back_is_refused() {
-    let mesh = moved_block(4, |x| x);
-    let triangles = [outward(&mesh, "z_min"), outward(&mesh, "z_max"), outward(&mesh, "x_max")].concat();
-    let setup =
-        DesignSetup { control: Control::Grid([3, 3]), ..DesignSetup::new(&triangles, Direction::Normal) };
-    let error = DesignSurface::new(&mesh, &setup).expect_err("it turns back");
-    assert!(matches!(error, DesignError::Folded { .. }), "{error}");
-    let side =
-        DesignSetup { control: Control::Grid([3, 3]), ..DesignSetup::new(&outward(&mesh, "x_max"), UP) };
-    assert!(matches!(DesignSurface::new(&mesh, &side), Err(DesignError::NoExtent { axis: 'x' })));
 }
 
 #[test]

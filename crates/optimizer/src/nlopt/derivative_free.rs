@@ -26,7 +26,7 @@ pub struct Search {
     pub lower: Vec<f64>,
     /// Upper bounds, above the lower ones.
     pub upper: Vec<f64>,
-    /// Most evaluations.
+    /// Most evaluations; 0 is no limit.
     pub evaluations: usize,
 }
 

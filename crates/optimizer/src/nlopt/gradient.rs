@@ -236,7 +236,9 @@ pub fn minimise<E: From<Error>>(
     evaluate: impl FnMut(&[f64]) -> Result<Sample, E>,
 ) -> Outcome<E> {
     let Some(scaling) = Scaling::new(settings, start) else {
-        return Outcome::Failed("a bound or the first design is not finite, or the bounds cross");
+        return Outcome::Failed(
+            "a bound, the first design or the first step is not finite, the bounds cross, or the first step is not positive",
+        );
     };
     let [mut lower, mut upper] = [&settings.lower, &settings.upper].map(|bounds| scaling.scale(bounds));
     let mut x = scaling.scale(start);

@@ -16,10 +16,12 @@ pub(super) struct Scaling {
 }
 
 impl Scaling {
-    /// Of the bounds; `None` where they or the start are not finite, or the bounds cross.
+    /// Of the bounds; `None` where they, the start or the first step are not finite, the bounds cross, or the first step is none.
     pub(super) fn new(settings: &Minimisation, start: &[f64]) -> Option<Self> {
         let [lower, upper] = [&settings.lower, &settings.upper];
-        let are_sound = start.len() == lower.len()
+        let are_sound = settings.first_step > 0.0
+            && settings.first_step.is_finite()
+            && start.len() == lower.len()
             && start.len() == upper.len()
             && start.iter().all(|p| p.is_finite())
             // Of infinite bounds the span is no length either.
@@ -92,10 +94,29 @@ pub(super) struct Factors {
 #[cfg(test)]
 mod tests {
     use super::super::Algorithm;
+    use super::super::Outcome;
     use super::super::gradient::minimise;
     use crate::error::Error;
 
     use super::*;
+
+    #[test]
+    fn a_first_step_that_is_none_is_refused() {
+        for first_step in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+            let settings = Minimisation {
+                algorithm: Algorithm::Mma,
+                lower: vec![0.0],
+                upper: vec![1.0],
+                constraints: 0,
+                members: 0,
+                ftol_rel: 1e-3,
+                xtol_rel: 0.0,
+                first_step,
+            };
+            let ended = minimise::<Error>(&settings, &[0.5], |_| unreachable!("nothing is asked for"));
+            assert!(matches!(ended, Outcome::Failed(why) if why.contains("first step")), "{first_step}");
+        }
+    }
 
     /// As the volume of a body that is shifted: its value and its derivatives are rounding.
     #[test]

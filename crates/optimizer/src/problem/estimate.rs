@@ -25,6 +25,15 @@ pub struct ErrorEstimate {
     pub iterations: usize,
 }
 
+/// The estimated error of an objective [its unit].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObjectiveError {
+    /// What the true value has more.
+    pub signed: f64,
+    /// Its size: elements whose errors cancel leave some of it.
+    pub size: f64,
+}
+
 /// The models of one order more that estimates at several designs share: those of the undeformed mesh, as a problem's own are.
 #[derive(Debug)]
 pub struct EnrichedModels {
@@ -63,10 +72,10 @@ const LEFT: f64 = 0.25;
 const MARKED: [f64; 2] = [0.2, 0.3];
 
 impl ErrorEstimate {
-    /// Size of the error of the objective that a mesh is judged by [its unit]: elements whose errors cancel leave some of it.
-    pub fn judged(&self) -> f64 {
+    /// The error of the objective.
+    pub fn of_objective(&self) -> ObjectiveError {
         let sizes: f64 = self.by_element.iter().map(|own| own.abs()).sum();
-        self.objective.abs().max(UNCANCELLED * sizes)
+        ObjectiveError { signed: self.objective, size: self.objective.abs().max(UNCANCELLED * sizes) }
     }
 
     /// Elements whose refinement takes the share `excess` off the error of the objective, in the order of their numbers: those
@@ -237,12 +246,14 @@ mod tests {
 
     #[test]
     fn errors_of_elements_cancel_to_a_hundredth_of_their_sizes_at_most() {
-        let judged = |objective: f64, by_element: &[f64]| {
+        let size = |objective: f64, by_element: &[f64]| {
             let by_element = by_element.to_vec();
-            ErrorEstimate { objective, constraints: Vec::new(), by_element, iterations: 0 }.judged()
+            ErrorEstimate { objective, constraints: Vec::new(), by_element, iterations: 0 }
+                .of_objective()
+                .size
         };
-        assert_eq!(judged(-0.5, &[1.0, -1.5]), 0.5);
-        assert_eq!(judged(-1e-6, &[1.0, -1.0078125]), UNCANCELLED * 2.0078125);
-        assert_eq!(judged(1e-6, &[]), 1e-6);
+        assert_eq!(size(-0.5, &[1.0, -1.5]), 0.5);
+        assert_eq!(size(-1e-6, &[1.0, -1.0078125]), UNCANCELLED * 2.0078125);
+        assert_eq!(size(1e-6, &[]), 1e-6);
     }
 }

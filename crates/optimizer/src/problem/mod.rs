@@ -32,7 +32,7 @@ use crate::objective::WeightedSum;
 
 pub use analysis::{Analysis, Measured, Timings};
 pub use cut::Cut;
-pub use estimate::{EnrichedModels, ErrorEstimate};
+pub use estimate::{EnrichedModels, ErrorEstimate, ObjectiveError};
 pub use evaluate::{Derivatives, SEARCH_ADJOINT_TOLERANCE};
 pub use progress::{NoProgress, Progress, Stage};
 pub use shape::{Shape, between};
@@ -124,7 +124,7 @@ impl Problem {
     }
 
     /// Lets go of states, constraints and shape, which hold nearly all of the memory: the undeformed mesh is left, and
-    /// nothing can be evaluated any more.
+    /// nothing is to be evaluated any more.
     pub fn release(&mut self) {
         (self.states, self.constraints, self.shape) = (Vec::new(), Vec::new(), None);
     }

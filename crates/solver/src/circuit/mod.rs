@@ -218,8 +218,8 @@ pub(crate) fn windings(
         let mut conductivities = regions.map(|region| materials[region.index()].conductivity);
         let conductivity = conductivities.next().unwrap_or(0.0);
         if conductivity == 0.0 || conductivities.any(|other| other != conductivity) {
-            let expected = "a solid conductor is of one material that conducts";
-            return Err(SolverError::EmptyRegion { region: coils[coil].name.clone(), expected });
+            let what = format!("conductivity of the solid conductor `{}`", coils[coil].name);
+            return Err(SolverError::parameter(what, conductivity, "one material that conducts"));
         }
         if windings.len() <= coil {
             windings.resize(coil + 1, None);

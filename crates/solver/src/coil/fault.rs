@@ -95,6 +95,11 @@ pub enum RegionFault {
         /// A node of both [m].
         place: Point,
     },
+    /// A solid conductor of which another coil is, too.
+    #[error(
+        "the coil `{other}` is of the same elements, and its current would not be seen; make both one coil, or two regions"
+    )]
+    Shared { other: String },
     /// A ring round a tunnel of the mesh.
     #[error(
         "its current flows round a tunnel of the mesh whose walls have no condition, and H would have to turn round it \

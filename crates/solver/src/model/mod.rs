@@ -32,7 +32,9 @@ use crate::tangents::Tangents;
 use crate::unknowns::Unknowns;
 use crate::weak_form::WeakForm;
 
-/// A field problem, ready to be solved on any mesh with its topology.
+/// A field problem, ready to be solved on any mesh with its topology whose elements with a current, a prescribed field or the shell of
+/// open space are where the mesh of the set-up has them: their loads are of that mesh. [`FieldModel::torn_source`] finds elements for
+/// which that does not hold.
 ///
 /// A clone shares what is large.
 #[derive(Clone, Debug)]
@@ -123,7 +125,7 @@ impl FieldModel {
     }
 
     /// The load of all sources and of the prescribed part of `A` [A m], one entry per unknown, then the net current [A] of each
-    /// solid conductor, zero where a voltage drives it.
+    /// segment of a solid conductor, zero where a voltage drives it.
     pub fn load(&self, mesh: &Mesh) -> Vec<c64> {
         let fine = &self.shared.fine;
         let mut load = vec![c64::default(); fine.unknowns.dofs.count()];
