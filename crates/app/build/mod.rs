@@ -48,7 +48,7 @@ pub use motion::{MotionSetup, set_up_motion};
 pub use names::with_names;
 pub(crate) use open::is_open;
 pub use outline::{Outline, OutlinedDesign, outline};
-pub(crate) use references::{functionals, region_in_mesh};
+pub(crate) use references::{functionals, region_in_mesh, surface_names};
 pub(crate) use refined::RefinedMesh;
 pub use skin::{Audited, PermeabilityOf};
 pub(crate) use skin::{audit_in_field, least_thickness, result_warnings, warnings as skin_warnings};

@@ -105,8 +105,8 @@ fn and_more(count: usize, how: &str) -> String {
 /// Edges of iron, of magnets and of conductors that their surfaces replace.
 ///
 /// Towards an edge of 270° of air B grows with the distance d as d^(−1/3) (Jackson, Classical Electrodynamics, 2.11); recovered in
-/// elements of size h it has at most what it has at 0.6 h, in both orders that an estimate compares: beside a cube of iron in a
-/// uniform field 1.56, 1.29, 1.19 and 1.13 times as much were there at 0.08, 0.25, 0.34 and 0.42 sizes, on elements of a quarter.
+/// elements of size h it has about what it has at 0.6 h, in both orders that an estimate compares: beside a cube of iron in a
+/// uniform field B is 1.56, 1.29, 1.19 and 1.13 times as large at 0.08, 0.25, 0.34 and 0.42 h, on a mesh of a quarter of the size.
 struct Edges<'a> {
     /// Without what is replaced.
     mesh: &'a Mesh,

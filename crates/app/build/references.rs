@@ -9,7 +9,7 @@ pub(super) fn is_condition(path: &str) -> bool {
 }
 
 /// Every surface that the configuration names, with the path of its key.
-pub(super) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
+pub(crate) fn surface_names<'a>(config: &'a Config) -> Vec<(String, &'a str)> {
     let mut names = Vec::new();
     let mut add = |path: &str, surfaces: &'a [String]| {
         names.extend(surfaces.iter().enumerate().map(|(i, name)| (format!("{path}[{i}]"), name.as_str())));

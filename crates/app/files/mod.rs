@@ -46,14 +46,14 @@ pub use result::{
     ConstraintResult, DesignResult, HomogeneityResult, LinearSolverResult, MeshResult, ObjectiveResult,
     OpenResult, RunResult, ShapeDeviation, TermResult, Verification, VerificationMesh,
 };
-pub(crate) use run_directory::{LOCK, check_place};
+pub(crate) use run_directory::check_place;
 pub use run_directory::{OverwritePolicy, RunDirectory};
 pub use state_result::{
     Amplitude, CoilResult, ForceError, HarmonicResult, MultipoleResult, ProbeResult, SaturatedRegion,
     SaturationResult, StateErrors, StateResult,
 };
 pub use synced::SyncedLog;
-pub(crate) use synced::{UNFINISHED, write_whole};
+pub(crate) use synced::{LOCK, UNFINISHED, remove_unfinished, write_whole};
 
 /// Why something could not be written or read back.
 #[derive(Debug, thiserror::Error)]
@@ -120,7 +120,7 @@ pub enum OutputError {
     DeadLink { path: PathBuf },
     /// A path that is to be kept in a file has bytes that are no text.
     #[error(
-        "`{path}` has a name that is no UTF-8 text, as which it is kept; rename it, or work from another folder"
+        "the path `{path}` is no UTF-8 text, and cannot be kept in the files of a run; rename the folder"
     )]
     NoText { path: PathBuf },
     /// A file of a run does not hold what it should.

@@ -62,8 +62,10 @@ pub fn extend_command(directory: &Path, evaluations: usize) -> String {
     format!("{} --max-evaluations {more}", resume_command(directory))
 }
 
+/// Refuses a path that a file cannot keep as text.
+///
 /// # Errors
-/// [`OutputError::NoText`] for a path that is none.
+/// [`OutputError::NoText`].
 pub(crate) fn check_text(path: &Path) -> Result<(), OutputError> {
     path.to_str().map(|_| ()).ok_or_else(|| OutputError::NoText { path: path.to_owned() })
 }
@@ -75,7 +77,7 @@ pub(crate) fn shell_word(path: &Path) -> String {
         let escaped = |byte: &u8| match byte {
             b'\'' | b'\\' => format!("\\{}", char::from(*byte)),
             b' '..=b'~' => char::from(*byte).to_string(),
-            other => format!("\\x{other:02x}"),
+            other => format!("\\{other:03o}"),
         };
         let bytes = path.as_os_str().as_encoded_bytes();
         let folder = if bytes.starts_with(b"-") { "./" } else { "" };
@@ -123,8 +125,8 @@ mod tests {
             ("$(rm)", "fluxmorph resume '$(rm)'"),
             ("-out", "fluxmorph resume ./-out"),
             ("", "fluxmorph resume ."),
-            ("it's \u{1b}[1m\\", r"fluxmorph resume $'it\'s \x1b[1m\\'"),
-            ("-ä\u{202e}", r"fluxmorph resume $'./-\xc3\xa4\xe2\x80\xae'"),
+            ("it's \u{1b}[1m\\", r"fluxmorph resume $'it\'s \033[1m\\'"),
+            ("-ä\u{202e}", r"fluxmorph resume $'./-\303\244\342\200\256'"),
         ] {
             assert_eq!(resume_command(Path::new(path)), expected);
         }

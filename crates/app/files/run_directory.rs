@@ -11,7 +11,7 @@ use super::disk::{Disk, DiskLock, Sharing};
 use super::manifest::Manifest;
 use super::names::{FIELDS, is_case, is_surface};
 use super::run_files::{FILES, OLDER_JOURNAL};
-use super::synced::{SyncedLog, UNFINISHED, folder_of, write_whole};
+use super::synced::{LOCK, SyncedLog, UNFINISHED, folder_of, remove_unfinished, write_whole};
 
 /// What to do with an earlier run in the same folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -33,9 +33,6 @@ pub struct RunDirectory {
 
 /// How long a directory in use is waited for.
 const PATIENCE: Duration = Duration::from_millis(500);
-
-/// The file that a process locks before it touches a directory. It stays: whoever removed it could not know who has it open.
-pub(crate) const LOCK: &str = ".fluxmorph-lock";
 
 /// What a folder holds that a run may begin in.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -309,11 +306,8 @@ impl RunDirectory {
     }
 
     pub(super) fn remove_unfinished(&self, folder: &Path) -> Result<(), OutputError> {
-        let is_unfinished = |name: &&String| name.starts_with(UNFINISHED) && *name != LOCK;
-        for name in self.entries(folder)?.iter().filter(is_unfinished) {
-            self.remove(&folder.join(name))?;
-        }
-        Ok(())
+        self.check_place()?;
+        remove_unfinished(&*self.disk, folder)
     }
 
     /// Names in a folder, sorted; none when there is no folder.

@@ -10,6 +10,9 @@ use std::path::{Path, PathBuf};
 use super::OutputError;
 use super::disk::{Disk, DiskFile};
 
+/// The file that a process locks before it touches a directory. It stays: whoever removed it could not know who has it open.
+pub(crate) const LOCK: &str = ".fluxmorph-lock";
+
 /// Start of the names of unfinished files.
 pub(crate) const UNFINISHED: &str = ".fluxmorph-";
 
@@ -39,6 +42,25 @@ pub(crate) fn write_whole(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<
         let _ = disk.remove(&unfinished);
     });
     written.and_then(|()| disk.sync_dir(folder)).map_err(OutputError::io("write", path))
+}
+
+/// Removes what a process that was killed had not written to its end in a folder, which may be missing.
+///
+/// # Errors
+/// When the operating system refuses.
+pub(crate) fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<(), OutputError> {
+    let unless_missing = |error: io::Error| match error.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Ok(()),
+        _ => Err(error),
+    };
+    let names = disk.names(folder).or_else(|error| unless_missing(error).map(|()| Vec::new()));
+    for name in names.map_err(OutputError::io("read", folder))? {
+        if name.starts_with(UNFINISHED) && name != LOCK {
+            let path = folder.join(name);
+            disk.remove(&path).or_else(unless_missing).map_err(OutputError::io("remove", path))?;
+        }
+    }
+    Ok(())
 }
 
 /// The temporary name of a file, in its folder; another process has another one.

@@ -8,7 +8,7 @@ use fluxmorph_optimizer::Error as OptimizerError;
 
 use super::prepared::Prepared;
 use super::recorder::DirectoryRecorder;
-use super::{Concluded, Options, Session, current_mesh_hash};
+use super::{Concluded, Options, Session, current_mesh_hash, mesh_hash, table_hashes};
 use crate::build::Mode;
 use crate::config::{Config, MeshConfig, SourceMap};
 use crate::error::Error;
@@ -119,6 +119,8 @@ pub(crate) fn resume_held(
         Some(contents) => (Journal::reopen(&directory, &contents)?, contents.records),
         None => {
             observer.warning("there is no journal.jsonl: all evaluations are computed anew");
+            session.manifest.mesh = Some(mesh_hash(session.config, &session.setup.full_mesh));
+            session.manifest.tables = table_hashes(&session.setup.tables);
             (Journal::create(&directory, session.identity())?, Vec::new())
         }
     };

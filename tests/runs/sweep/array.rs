@@ -74,7 +74,7 @@ fn a_broken_task_is_resumed_and_a_changed_sweep_refused() {
 
 /// Each is a sound run by itself.
 #[test]
-fn runs_of_other_inputs_are_told_and_not_compared() {
+fn runs_of_other_inputs_are_reported_and_not_compared() {
     let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
     let home = Home::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
     home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
@@ -99,8 +99,8 @@ fn runs_of_other_inputs_are_told_and_not_compared() {
     let table = home.text("out/sweep.csv");
     let [first, second, third] = [1, 2, 3].map(|k| table.lines().nth(k).expect("a row").to_owned());
     assert!(first.starts_with("2 mm,stopped,max_evaluations,1,"), "{table}");
-    assert!(second.starts_with("3 mm,stopped,,,,"), "{table}");
-    assert!(third.starts_with("4 mm,stopped,,,,"), "{table}");
+    assert!(second.starts_with("3 mm,stopped,max_evaluations,1,,,,"), "{table}");
+    assert!(third.starts_with("4 mm,stopped,max_evaluations,1,,,,"), "{table}");
     let page = home.text("out/sweep.html");
     assert!(page.contains("not compared: its configuration is another"), "{page}");
 }

@@ -140,13 +140,13 @@ fn a_folder_whose_name_is_no_text_is_refused_before_anything_is_written() {
     let home = Home::new();
     let odd = home.path("").join(std::ffi::OsStr::from_bytes(b"latin-1 \xe4"));
     let sweep = ["sweep", "block.toml", "--set", "design.upper=2 mm,3 mm"];
-    finish(home.command(&sweep).arg("--out").arg(&odd)).with(5, &["no UTF-8 text", "rename it"]);
+    finish(home.command(&sweep).arg("--out").arg(&odd)).with(5, &["is no UTF-8 text", "rename the folder"]);
     assert!(!odd.exists());
     std::fs::create_dir(&odd).expect("made");
     std::fs::copy(home.path("block.toml"), odd.join("block.toml")).expect("copied");
     for command in ["run", "solve"] {
         finish(home.command(&[command, "block.toml", "--out", "out"]).current_dir(&odd))
-            .with(5, &["no UTF-8 text", "rename it"]);
+            .with(5, &["is no UTF-8 text", "rename the folder"]);
     }
     finish(home.command(&sweep[..2]).current_dir(&odd)).with(5, &["no UTF-8 text"]);
     assert_eq!(std::fs::read_dir(&odd).expect("a folder").count(), 1);

@@ -89,6 +89,10 @@ fn another_mesh_in_the_same_file_is_noticed() {
     let set = ["--set", "design.upper=2 mm,3 mm", "--max-evaluations", "1"];
     home.sweep("out", &set).with(1, &[]);
     assert_eq!(home.sweep("out", &set).with(1, &[]).count("skipped"), 2);
+    // What is made of one file may differ.
+    let set_of_surfaces = ["--set", "output.stl=[],[\"iron|gap\"]", "--max-evaluations", "1"];
+    let alike = home.sweep("alike", &set_of_surfaces).with(1, &[]);
+    assert_eq!(alike.count("is not compared"), 0, "{}", alike.stderr);
     mesh("first");
     home.sweep("out", &set).with(5, &["holds another run: its mesh file is another, or has changed since"]);
 }
@@ -103,6 +107,30 @@ fn another_curve_in_the_same_file_is_noticed() {
     assert_eq!(home.sweep("out", &set).with(1, &[]).count("skipped"), 2);
     home.edit("iron.csv", "0.5", "0.4");
     home.sweep("out", &set).with(5, &["holds another run: the B–H table `", "iron.csv` has changed since"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_run_that_begins_on_another_curve_than_the_first_is_not_compared() {
+    let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
+    let home = Home::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
+    home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
+    let sweep = start(&home, &[]);
+    for (k, run) in RUNS.iter().enumerate() {
+        wait_until("a run at work", || home.rows(&format!("out/{run}")) > 0);
+        if k == 0 {
+            home.edit("iron.csv", "0.5", "0.4");
+        }
+        children_of(&sweep).into_iter().for_each(|run| send("TERM", run));
+    }
+    let output = sweep.wait_with_output().expect("it ends");
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(5), "{said}");
+    for run in &RUNS[1..] {
+        let reason = "iron.csv` was another file when it began than for `design.upper=2mm`";
+        assert!(said.contains(&format!("`{run}` is not compared: `")) && said.contains(reason), "{said}");
+    }
+    assert!(!said.contains("`design.upper=2mm` is not compared"), "{said}");
 }
 
 #[cfg(target_os = "linux")]

@@ -6,11 +6,12 @@ use std::path::Path;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::state::Input;
 use super::{Criterion, Layout, Planned, Sweep, front, page, state};
 use crate::config::Goal;
 use crate::error::Error;
 use crate::files::{
-    FileHash, Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, Verdict, csv_text,
+    Manifest, OutputError, RunDirectory, RunResult, RunStatus, StopReason, Verdict, csv_text,
 };
 use crate::run::journal::Journal;
 
@@ -72,9 +73,9 @@ pub struct Row {
     pub(super) curve: Vec<[f64; 2]>,
     /// Mesh and tables that it has read from files.
     #[serde(skip)]
-    pub(super) inputs: Vec<FileHash>,
-    /// Why it is no run of this sweep, and has none of its numbers here; `None` where it is one.
-    #[serde(skip)]
+    pub(super) inputs: Vec<Input>,
+    /// Why it is no run of this sweep, and what it has found is not here; `None` where it is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) difference: Option<String>,
     /// What there is to read about the run, relative to the sweep, and what it is called.
     #[serde(skip)]
@@ -113,30 +114,25 @@ impl Comparison {
         self.combinations.iter().filter_map(|row| Some((row, row.difference.as_deref()?)))
     }
 
-    /// Takes the numbers from runs of another configuration, and from those that have read another content of a file than the first
-    /// run that read it: the file was changed meanwhile.
+    /// Takes what they have found from runs of another configuration, and from those that have read another content of a file than
+    /// the first run that read it, of those that have ended if there are any: the file was changed meanwhile.
     fn leave_out_others(&mut self) {
-        let mut known: BTreeMap<String, (String, String)> = BTreeMap::new();
-        for row in &mut self.combinations {
-            for FileHash { path, blake3 } in &row.inputs {
+        let mut order: Vec<usize> = (0..self.combinations.len()).collect();
+        order.sort_by_key(|row| !self.combinations[*row].has_ended());
+        let mut known: BTreeMap<(String, String), (String, String)> = BTreeMap::new();
+        for index in order {
+            let row = &mut self.combinations[index];
+            for Input { key, blake3 } in &row.inputs {
                 let (first, directory) =
-                    known.entry(path.clone()).or_insert_with(|| (blake3.clone(), row.directory.clone()));
+                    known.entry(key.clone()).or_insert_with(|| (blake3.clone(), row.directory.clone()));
                 if first != blake3 && row.difference.is_none() {
+                    let (file, _) = key;
                     row.difference =
-                        Some(format!("`{path}` was another file when it began than for `{directory}`"));
+                        Some(format!("`{file}` was another file when it began than for `{directory}`"));
                 }
             }
             if row.difference.is_some() {
-                *row = Row {
-                    curve: Vec::new(),
-                    values: std::mem::take(&mut row.values),
-                    directory: std::mem::take(&mut row.directory),
-                    inputs: std::mem::take(&mut row.inputs),
-                    difference: row.difference.take(),
-                    file: row.file.take(),
-                    status: row.status,
-                    ..Row::default()
-                };
+                *row = row.without_what_it_found();
             }
         }
     }
@@ -258,13 +254,18 @@ impl Row {
         };
         let manifest = Manifest::read(&run)?;
         let curve = curve(&run)?;
-        let is_configured = run.holds_configuration();
-        let other = || is_configured.then(|| state::configured(&run, &manifest, planned).err()).flatten();
-        let difference = state::other_command(&manifest).or_else(other);
-        // A mesh that is generated may differ from run to run.
-        let mesh = manifest.mesh.as_ref().filter(|_| planned.mesh.is_some());
-        let mesh = mesh.map(|mesh| FileHash { path: mesh.origin.clone(), blake3: mesh.blake3.clone() });
         let result = state::result(&run, &manifest);
+        let is_configured = run.holds_configuration() || result.is_some();
+        let read = match state::other_command(&manifest) {
+            Some(difference) => Err(difference),
+            None if is_configured => state::configured(&run, &manifest, planned)
+                .map(|(config, _)| state::inputs(&config, &manifest)),
+            None => Ok(Vec::new()),
+        };
+        let (inputs, difference) = match read {
+            Ok(inputs) => (inputs, None),
+            Err(difference) => (Vec::new(), Some(difference)),
+        };
         let objective = result.as_ref().and_then(|result| result.objective.as_ref());
         let of_result = |value: fn(&RunResult) -> Option<f64>| result.as_ref().and_then(value);
         let length = Some(curve.len()).filter(|length| *length > 0);
@@ -282,11 +283,7 @@ impl Row {
             seconds: of_result(|result| result.timings_s.get("total").copied()),
             peak_memory_bytes: result.as_ref().map(|result| result.peak_memory_bytes),
             violated: result.as_ref().map_or(Vec::new(), RunResult::violated),
-            inputs: if difference.is_none() {
-                mesh.into_iter().chain(manifest.tables).collect()
-            } else {
-                Vec::new()
-            },
+            inputs,
             difference,
             file: Some(if is_file(layout, &run.report()) {
                 (format!("{}/report.html", blank.directory), "report")
@@ -296,6 +293,22 @@ impl Row {
             curve,
             ..blank
         })
+    }
+
+    /// How it ended, and where it is.
+    fn without_what_it_found(&self) -> Self {
+        Self {
+            values: self.values.clone(),
+            status: self.status,
+            stop_reason: self.stop_reason,
+            evaluations: self.evaluations,
+            seconds: self.seconds,
+            directory: self.directory.clone(),
+            inputs: self.inputs.clone(),
+            difference: self.difference.clone(),
+            file: self.file.clone(),
+            ..Self::default()
+        }
     }
 
     fn blank(planned: &Planned) -> Self {

@@ -10,7 +10,7 @@ use super::{Planned, Setting, Sweep, SweepError};
 use crate::error::Error;
 use crate::files::{
     Disk, DiskLock, FileHash, LOCK, OutputError, OverwritePolicy, Sharing, UNFINISHED, check_place,
-    read_json, shell_word, to_json, write_whole,
+    read_json, remove_unfinished, shell_word, to_json, write_whole,
 };
 
 /// The mark by which a directory is known as ours.
@@ -76,7 +76,7 @@ impl Layout {
         layout.acquire(Sharing::Exclusive)?;
         // Another process may have come and gone between the look and the lock.
         layout.check_free(sweep)?;
-        layout.remove_unfinished()?;
+        remove_unfinished(&**disk, &layout.path)?;
         let logs = layout.path.join(LOGS);
         if disk.is_link(&logs) {
             return Err(OutputError::Linked { path: logs }.into());
@@ -93,16 +93,6 @@ impl Layout {
     pub fn acquire(&mut self, sharing: Sharing) -> Result<(), OutputError> {
         let locked = self.disk.lock(&self.path.join(LOCK), sharing);
         self.lock = locked.map_err(OutputError::io("lock", &self.path))?.map(Arc::from);
-        Ok(())
-    }
-
-    /// Removes what a sweep that was killed had not written to its end.
-    fn remove_unfinished(&self) -> Result<(), OutputError> {
-        let names = self.disk.names(&self.path).map_err(OutputError::io("read", &self.path))?;
-        for name in names.iter().filter(|name| name.starts_with(UNFINISHED) && *name != LOCK) {
-            let path = self.path.join(name);
-            self.disk.remove(&path).map_err(OutputError::io("remove", &path))?;
-        }
         Ok(())
     }
 

@@ -89,6 +89,8 @@ impl Sweep {
     /// [`SweepError`] where the values are no sweep, and [`SweepError::Faults`] with what is wrong in any combination; a
     /// configuration that cannot be read at all.
     pub fn plan(request: &Request<'_>) -> Result<Self, Error> {
+        // The commands of the runs are text, and so is the folder of their configuration in their manifests.
+        check_text(&std::path::absolute(request.config).unwrap_or_else(|_| request.config.to_owned()))?;
         let settings =
             request.set.iter().map(|typed| Setting::parse(typed)).collect::<Result<Vec<_>, _>>()?;
         let mut planned = Vec::new();
@@ -112,7 +114,7 @@ impl Sweep {
             let configured = LimitsInForce::of(&config.optimizer);
             planned.push(Planned {
                 combination,
-                fingerprint: fingerprint(&config),
+                fingerprint: fingerprint(&config, source.directory()),
                 mesh: mesh_file(&config).map(Path::to_owned),
                 limits: LimitsInForce {
                     max_evaluations: request.limits.max_evaluations.unwrap_or(configured.max_evaluations),
@@ -126,8 +128,6 @@ impl Sweep {
         faulty.check(planned.len())?;
         let (config, source) = first.expect("a product has at least one combination");
         let directory = request.out.map_or_else(|| beside(&config.output.directory), Path::to_owned);
-        // The commands of the runs are text.
-        check_text(request.config)?;
         check_text(&directory)?;
         Ok(Self {
             config: FileHash {

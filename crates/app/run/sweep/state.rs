@@ -6,11 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{Planned, Sweep};
-use crate::build::LARGEST_TABLE;
+use crate::build::{LARGEST_TABLE, surface_names};
 use crate::config::{Config, MeshConfig, Optimizer, SourceMap, resolved_toml};
 use crate::files::{
     Disk, FileHash, Manifest, MeshHash, OutputError, RunDirectory, RunResult, RunStatus, StopReason,
-    blake3_hex,
+    UNFINISHED, blake3_hex,
 };
 use crate::run;
 
@@ -140,11 +140,34 @@ pub(super) fn configured(
     manifest: &Manifest,
     planned: &Planned,
 ) -> Result<(Config, SourceMap), String> {
-    let read = run::configuration(run, manifest).map_err(|error| error.to_string())?;
-    match fingerprint(&read.0) == planned.fingerprint {
-        true => Ok(read),
-        false => Err("its configuration is another".to_owned()),
+    let (config, source) = run::configuration(run, manifest).map_err(|error| error.to_string())?;
+    if fingerprint(&config, source.directory()) != planned.fingerprint {
+        return Err("its configuration is another".to_owned());
     }
+    Ok((config, source))
+}
+
+/// The content of a file that a run has read.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Input {
+    /// The file, and all else that its hash depends on.
+    pub(super) key: (String, String),
+    /// BLAKE3, hexadecimal.
+    pub(super) blake3: String,
+}
+
+/// What a run has read from files: B–H tables, and a mesh, which its manifest has with the surfaces and the shell that are made of it.
+pub(super) fn inputs(config: &Config, manifest: &Manifest) -> Vec<Input> {
+    let input = |file: &str, more: String, blake3: &str| Input {
+        key: (file.to_owned(), more),
+        blake3: blake3.to_owned(),
+    };
+    let mesh = manifest.mesh.as_ref().filter(|_| mesh_file(config).is_some()).map(|mesh| {
+        let more = format!("{:?} {:?} {:?}", config.mesh, config.open, surface_names(config));
+        input(&mesh.origin, more, &mesh.blake3)
+    });
+    let tables = manifest.tables.iter().map(|table| input(&table.path, String::new(), &table.blake3));
+    mesh.into_iter().chain(tables).collect()
 }
 
 /// The file of a mesh that is read.
@@ -155,10 +178,15 @@ pub(super) fn mesh_file(config: &Config) -> Option<&Path> {
     }
 }
 
-/// BLAKE3 of a configuration without its title, its limits, and where its files are: with others of these a run that has
+/// BLAKE3 of a configuration in a folder without its title, its limits, and where its files are: with others of these a run that has
 /// ended is what it was.
-pub(super) fn fingerprint(config: &Config) -> [u8; 32] {
+pub(super) fn fingerprint(config: &Config, folder: &Path) -> [u8; 32] {
     let mut bare = config.clone();
+    for table in bare.materials.values_mut().filter_map(|material| material.bh_file.as_mut()) {
+        if let Ok(inside) = table.strip_prefix(folder) {
+            *table = inside.to_owned();
+        }
+    }
     let Optimizer { max_evaluations, max_time, .. } = Optimizer::default();
     (bare.optimizer.max_evaluations, bare.optimizer.max_time) = (max_evaluations, max_time);
     bare.title.clear();
@@ -191,5 +219,5 @@ fn may_continue(result: &RunResult, sweep: &Sweep, planned: &Planned) -> bool {
 /// Whether these names in a folder are only what the very start of a run leaves.
 fn hold_nothing(names: &[String], disk: &Arc<dyn Disk>, path: &Path) -> bool {
     let is_empty = |name: &str| disk.names(&path.join(name)).is_ok_and(|names| names.is_empty());
-    names.iter().all(|name| name.starts_with(".fluxmorph-") || (name == "fields" && is_empty(name)))
+    names.iter().all(|name| name.starts_with(UNFINISHED) || (name == "fields" && is_empty(name)))
 }

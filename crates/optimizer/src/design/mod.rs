@@ -121,9 +121,9 @@ impl DesignSetup {
             cuts: Vec::new(),
         }
     }
-}
 
-impl DesignSetup {
+    /// Refuses numbers out of range.
+    ///
     /// # Errors
     /// [`DesignError::Parameter`].
     fn check(&self) -> Result<(), DesignError> {

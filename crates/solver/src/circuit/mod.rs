@@ -203,7 +203,7 @@ impl Windings {
 /// The windings of all coils: that of a solid conductor has one turn, and at 0 Hz the resistance of its conduction.
 ///
 /// # Errors
-/// [`SolverError::EmptyRegion`] for a solid conductor of a material that does not conduct, or of several; else as
+/// [`SolverError::Parameter`] for a solid conductor of a material that does not conduct, or of several; else as
 /// [`SolidConductor::direct_resistance`](crate::coil::SolidConductor::direct_resistance).
 pub(crate) fn windings(
     mesh: &Mesh,
@@ -219,7 +219,11 @@ pub(crate) fn windings(
         let conductivity = conductivities.next().unwrap_or(0.0);
         if conductivity == 0.0 || conductivities.any(|other| other != conductivity) {
             let what = format!("conductivity of the solid conductor `{}`", coils[coil].name);
-            return Err(SolverError::parameter(what, conductivity, "one material that conducts"));
+            return Err(SolverError::parameter(
+                what,
+                conductivity,
+                "the same positive number in all of its elements",
+            ));
         }
         if windings.len() <= coil {
             windings.resize(coil + 1, None);

@@ -32,9 +32,10 @@ use crate::tangents::Tangents;
 use crate::unknowns::Unknowns;
 use crate::weak_form::WeakForm;
 
-/// A field problem, ready to be solved on any mesh with its topology whose elements with a current, a prescribed field or the shell of
-/// open space are where the mesh of the set-up has them: their loads are of that mesh. [`FieldModel::torn_source`] finds elements for
-/// which that does not hold.
+/// A field problem, ready to be solved on any mesh with its topology.
+///
+/// Currents, prescribed fields and the shell of open space are those of the mesh of the set-up: their elements must not move.
+/// [`FieldModel::torn_source`] finds one that would.
 ///
 /// A clone shares what is large.
 #[derive(Clone, Debug)]

@@ -415,7 +415,7 @@ fn solid_conductors_that_cannot_be_are_refused() {
         ((|own| own.boundaries = flux_parallel(&["x_min", "x_max"])) as Change, "nothing connects"),
         (|own| own.materials[0] = METAL, "another conductor touches it"),
         (|own| (own.materials[0], own.frequency) = (METAL, 0.0), "another conductor touches it"),
-        (|own| own.materials[1] = Material::AIR, "one material that conducts"),
+        (|own| own.materials[1] = Material::AIR, "the same positive number in all of its elements"),
         (|own| own.coils.push(own.coils[0].clone()), "the coil `bar` is of the same elements"),
     ] {
         let mut setup = sound.clone();
