@@ -73,22 +73,18 @@ pub(crate) fn check_text(path: &Path) -> Result<(), OutputError> {
 /// A path as one word of a shell's command line; bytes that are no text, or that a terminal would act on, as `bash` and its like take
 /// them between `$'` and `'`.
 pub(crate) fn shell_word(path: &Path) -> String {
+    // A name that begins with a dash would be taken for an option.
+    let bytes = path.as_os_str().as_encoded_bytes();
+    let folder = if bytes.starts_with(b"-") { "./" } else { "" };
     if path.to_str().is_none_or(|text| text.contains(is_hidden)) {
         let escaped = |byte: &u8| match byte {
             b'\'' | b'\\' => format!("\\{}", char::from(*byte)),
             b' '..=b'~' => char::from(*byte).to_string(),
             other => format!("\\{other:03o}"),
         };
-        let bytes = path.as_os_str().as_encoded_bytes();
-        let folder = if bytes.starts_with(b"-") { "./" } else { "" };
         return format!("$'{folder}{}'", bytes.iter().map(escaped).collect::<String>());
     }
-    // A name that begins with a dash would be taken for an option.
-    let path = match path.display().to_string() {
-        path if path.starts_with('-') => format!("./{path}"),
-        path if path.is_empty() => ".".to_owned(),
-        path => path,
-    };
+    let path = if bytes.is_empty() { ".".to_owned() } else { format!("{folder}{}", path.display()) };
     let is_plain = |c: char| c.is_alphanumeric() || "/._-+,:@%".contains(c);
     if path.chars().all(is_plain) { path } else { format!("'{}'", path.replace('\'', "'\\''")) }
 }

@@ -11,7 +11,9 @@ use super::disk::{Disk, DiskLock, Sharing};
 use super::manifest::Manifest;
 use super::names::{FIELDS, is_case, is_surface};
 use super::run_files::{FILES, OLDER_JOURNAL};
-use super::synced::{LOCK, SyncedLog, UNFINISHED, folder_of, remove_unfinished, write_whole};
+use super::synced::{
+    LOCK, SyncedLog, UNFINISHED, folder_of, names_in, remove, remove_unfinished, write_whole,
+};
 
 /// What to do with an earlier run in the same folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -312,23 +314,13 @@ impl RunDirectory {
 
     /// Names in a folder, sorted; none when there is no folder.
     pub(super) fn entries(&self, folder: &Path) -> Result<Vec<String>, OutputError> {
-        match self.disk.names(folder) {
-            Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
-                Ok(Vec::new())
-            }
-            other => other.map_err(OutputError::io("read", folder)),
-        }
+        names_in(&*self.disk, folder)
     }
 
     /// Removes a file of the run, if it is there.
     pub fn remove(&self, path: &Path) -> Result<(), OutputError> {
         self.check_place()?;
-        match self.disk.remove(path) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                Err(OutputError::io("remove", path)(error))
-            }
-            _ => Ok(()),
-        }
+        remove(&*self.disk, path)
     }
 
     /// Writes a whole file of the run, replacing an older one: at any moment its place holds the one or the other.

@@ -49,18 +49,36 @@ pub(crate) fn write_whole(disk: &dyn Disk, path: &Path, bytes: &[u8]) -> Result<
 /// # Errors
 /// When the operating system refuses.
 pub(crate) fn remove_unfinished(disk: &dyn Disk, folder: &Path) -> Result<(), OutputError> {
-    let unless_missing = |error: io::Error| match error.kind() {
-        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => Ok(()),
-        _ => Err(error),
-    };
-    let names = disk.names(folder).or_else(|error| unless_missing(error).map(|()| Vec::new()));
-    for name in names.map_err(OutputError::io("read", folder))? {
+    for name in names_in(disk, folder)? {
         if name.starts_with(UNFINISHED) && name != LOCK {
-            let path = folder.join(name);
-            disk.remove(&path).or_else(unless_missing).map_err(OutputError::io("remove", path))?;
+            remove(disk, &folder.join(name))?;
         }
     }
     Ok(())
+}
+
+/// Names in a folder, sorted; none when there is no folder.
+///
+/// # Errors
+/// When the operating system refuses.
+pub(super) fn names_in(disk: &dyn Disk, folder: &Path) -> Result<Vec<String>, OutputError> {
+    match disk.names(folder) {
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
+            Ok(Vec::new())
+        }
+        other => other.map_err(OutputError::io("read", folder)),
+    }
+}
+
+/// Removes a file, if it is there.
+///
+/// # Errors
+/// When the operating system refuses.
+pub(super) fn remove(disk: &dyn Disk, path: &Path) -> Result<(), OutputError> {
+    match disk.remove(path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(OutputError::io("remove", path)(error)),
+        _ => Ok(()),
+    }
 }
 
 /// The temporary name of a file, in its folder; another process has another one.

@@ -75,9 +75,7 @@ fn a_broken_task_is_resumed_and_a_changed_sweep_refused() {
 /// Each is a sound run by itself.
 #[test]
 fn runs_of_other_inputs_are_reported_and_not_compared() {
-    let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
-    let home = Home::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
-    home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
+    let home = Home::on_a_curve();
     let set = ["--set", "design.upper=2 mm,3 mm,4 mm", "--max-evaluations", "1"];
     home.sweep("out", &[&set[..], &["--script", "sweep.sh"]].concat()).with(0, &[]);
     task(&home, 0).with(1, &[": begun"]);

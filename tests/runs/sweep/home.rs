@@ -30,6 +30,14 @@ impl Home {
         home
     }
 
+    /// The block of iron that saturates by `iron.csv`, at rest.
+    pub(crate) fn on_a_curve() -> Self {
+        let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
+        let home = Self::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
+        home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
+        home
+    }
+
     /// The block on so many elements that a run has some hundred evaluations, and a second of them is a dozen.
     pub(crate) fn slower() -> Self {
         let finer = ("cells = [2, 2, 1]", "cells = [6, 6, 3]");

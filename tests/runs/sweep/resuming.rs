@@ -99,9 +99,7 @@ fn another_mesh_in_the_same_file_is_noticed() {
 
 #[test]
 fn another_curve_in_the_same_file_is_noticed() {
-    let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
-    let home = Home::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
-    home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
+    let home = Home::on_a_curve();
     let set = ["--set", "design.upper=2 mm,3 mm", "--max-evaluations", "1"];
     home.sweep("out", &set).with(1, &[]);
     assert_eq!(home.sweep("out", &set).with(1, &[]).count("skipped"), 2);
@@ -112,9 +110,7 @@ fn another_curve_in_the_same_file_is_noticed() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_run_that_begins_on_another_curve_than_the_first_is_not_compared() {
-    let linear = "relative_permeability = 100\nconductivity = \"1e6 S/m\"";
-    let home = Home::with(&[("\"50 Hz\"", "0"), (linear, "bh_file = \"iron.csv\"")]);
-    home.write("iron.csv", "100, 0.5\n1000, 1.5\n100000, 2.2\n");
+    let home = Home::on_a_curve();
     let sweep = start(&home, &[]);
     for (k, run) in RUNS.iter().enumerate() {
         wait_until("a run at work", || home.rows(&format!("out/{run}")) > 0);

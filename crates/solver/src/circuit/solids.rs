@@ -217,9 +217,8 @@ pub(crate) fn check(
     }
     let topology = mesh.topology();
     let is_stranded = |e: &ElementId| {
-        let currents = coils.iter().filter(|coil| !matches!(coil.shape, CoilShape::Solid(_)));
-        let mut currents = currents.filter_map(|coil| coil.shape.region_current());
-        currents.any(|current| current.current_density().binary_search_by_key(e, |(e, _)| *e).is_ok())
+        let mut stranded = coils.iter().filter(|coil| !matches!(coil.shape, CoilShape::Solid(_)));
+        stranded.any(|coil| coil.shape.flows_in(*e))
     };
     let conducts = |e: &ElementId| materials[topology.region_of()[e.index()].index()].conductivity > 0.0;
     let conducting = match &conductors.elements[..] {
