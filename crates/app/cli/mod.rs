@@ -45,16 +45,24 @@ pub fn main() -> std::process::ExitCode {
     }
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
-        Err(error) => {
-            // Help and version are asked for, and go to standard output; a closed pipe is no reason to panic.
-            let code = if error.use_stderr() { ExitCode::Usage } else { ExitCode::Success };
-            if !ranks::is_worker() {
-                let _ = error.print();
-            }
-            return code.into();
-        }
+        Err(error) => return print_usage(&error).into(),
     };
     panic::report_panics(|| run_command(&cli)).into()
+}
+
+/// Prints what is wrong with a command line, or help and version, which are asked for and go to standard output.
+fn print_usage(error: &clap::Error) -> ExitCode {
+    let printed = if ranks::is_worker() { Ok(()) } else { error.print() };
+    if error.use_stderr() {
+        return ExitCode::Usage;
+    }
+    match stdout::unless_closed(printed) {
+        Ok(()) => ExitCode::Success,
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "{}", message(&error));
+            error.exit_code()
+        }
+    }
 }
 
 /// Runs a command; its exit code.

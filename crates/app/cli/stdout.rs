@@ -9,15 +9,18 @@ use crate::files::{OutputError, STDOUT};
 use crate::printable::{printable, printable_json};
 
 /// Print a text; letters in it that would act on a terminal are written out.
-///
-/// A reader that has closed its end, such as `head`, has what it wanted: that is no error.
 pub fn print(text: &str) -> Result<(), Error> {
     write(&printable(text))
 }
 
 fn write(text: &str) -> Result<(), Error> {
     let mut stdout = std::io::stdout().lock();
-    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+    unless_closed(stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()))
+}
+
+/// An error of standard output. A reader that has closed its end, such as `head`, has what it wanted: that is none.
+pub fn unless_closed(written: std::io::Result<()>) -> Result<(), Error> {
+    match written {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(OutputError::io("write to", STDOUT)(error).into())
         }

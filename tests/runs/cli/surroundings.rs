@@ -35,7 +35,8 @@ fn a_reader_that_has_enough_is_no_error() {
 #[cfg(target_os = "linux")]
 fn a_full_disk_behind_standard_output_is_told() {
     let folder = tiny();
-    for arguments in [&["check", "tiny.toml"][..], &["generate", "man"], &["check", "tiny.toml", "--json"]] {
+    let json = &["check", "tiny.toml", "--json"];
+    for arguments in [&["check", "tiny.toml"][..], json, &["generate", "man"], &["run", "--help"]] {
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
         finish(program().args(arguments).current_dir(folder.path()).stdout(full))
             .with(5, &["cannot write to `standard output`"]);
