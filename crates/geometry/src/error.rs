@@ -97,3 +97,14 @@ pub enum MeshError {
     #[error("{}: {cause}", path.display())]
     File { path: PathBuf, cause: std::io::Error },
 }
+
+impl MeshError {
+    /// [`MeshError::Parameter`] of these texts.
+    pub(crate) fn parameter(
+        parameter: &'static str,
+        value: impl ToString,
+        expected: impl Into<String>,
+    ) -> Self {
+        Self::Parameter { parameter, value: value.to_string(), expected: expected.into() }
+    }
+}

@@ -46,18 +46,12 @@ impl BlockParameters {
 fn grid(parameters: &BlockParameters) -> Result<Grid, MeshError> {
     let BlockParameters { size, cells } = *parameters;
     if !size.iter().all(|s| *s > 0.0 && s.is_finite()) {
-        return Err(MeshError::Parameter {
-            parameter: "block.size",
-            value: format!("{size:?} m"),
-            expected: "all three edge lengths must be positive and finite".into(),
-        });
+        let expected = "all three edge lengths must be positive and finite";
+        return Err(MeshError::parameter("block.size", format!("{size:?} m"), expected));
     }
     if cells.contains(&0) {
-        return Err(MeshError::Parameter {
-            parameter: "block.cells",
-            value: format!("{cells:?}"),
-            expected: "at least one cell is needed along every axis".into(),
-        });
+        let expected = "at least one cell is needed along every axis";
+        return Err(MeshError::parameter("block.cells", format!("{cells:?}"), expected));
     }
     check_size("block.cells", cells)?;
     Grid::new("block.size", [0, 1, 2].map(|d| equal_parts([0.0, size[d]], cells[d])))

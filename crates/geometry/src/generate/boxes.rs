@@ -101,20 +101,14 @@ pub fn boxes(parameters: &BoxesParameters) -> Result<Mesh, MeshError> {
     let points = grid.points();
     for patch in &parameters.surfaces {
         if topology.surface(&patch.name).is_ok() {
-            return Err(MeshError::Parameter {
-                parameter: "boxes.surfaces",
-                value: format!("`{}`, which is an outer face of the mesh or an earlier patch", patch.name),
-                expected: "a name of its own".into(),
-            });
+            let value = format!("`{}`, which is an outer face of the mesh or an earlier patch", patch.name);
+            return Err(MeshError::parameter("boxes.surfaces", value, "a name of its own"));
         }
         let triangles = patch_triangles(patch, &topology, &points, tolerance(parameters));
         if triangles.is_empty() {
-            return Err(MeshError::Parameter {
-                parameter: "boxes.surfaces",
-                value: format!("`{}` in {:?} m", patch.name, patch.corners),
-                expected: "no face between regions and no outer face lies there; a patch must hold some"
-                    .into(),
-            });
+            let value = format!("`{}` in {:?} m", patch.name, patch.corners);
+            let expected = "no face between regions and no outer face lies there; a patch must hold some";
+            return Err(MeshError::parameter("boxes.surfaces", value, expected));
         }
         topology = topology.with_surface(&patch.name, triangles)?;
     }
@@ -149,16 +143,13 @@ fn tolerance(p: &BoxesParameters) -> f64 {
 }
 
 fn check(p: &BoxesParameters) -> Result<(), MeshError> {
-    let refuse =
-        |parameter, value: String, expected: String| Err(MeshError::Parameter { parameter, value, expected });
     let [lower, upper] = p.corners;
     if !(0..3).all(|d| lower[d] < upper[d] && lower[d].is_finite() && upper[d].is_finite()) {
-        let expected = "the lower corner first, below the upper corner in x, y and z".to_owned();
-        return refuse("boxes.box", format!("{:?} m", p.corners), expected);
+        let expected = "the lower corner first, below the upper corner in x, y and z";
+        return Err(MeshError::parameter("boxes.box", format!("{:?} m", p.corners), expected));
     }
     if !(p.refinement > 0.0 && p.refinement.is_finite()) {
-        let expected = "a positive number".to_owned();
-        return refuse("boxes.refinement", p.refinement.to_string(), expected);
+        return Err(MeshError::parameter("boxes.refinement", p.refinement, "a positive number"));
     }
     let room = tolerance(p);
     let within = |corners: &Corners| {
@@ -167,19 +158,19 @@ fn check(p: &BoxesParameters) -> Result<(), MeshError> {
     for region in &p.regions {
         let volume = (0..3).all(|d| region.corners[0][d] < region.corners[1][d]);
         if !(volume && within(&region.corners)) {
-            return refuse(
-                "boxes.regions",
-                format!("`{}` from {:?} to {:?} m", region.name, region.corners[0], region.corners[1]),
-                format!("a box with a volume within {lower:?} to {upper:?} m"),
-            );
+            let value =
+                format!("`{}` from {:?} to {:?} m", region.name, region.corners[0], region.corners[1]);
+            let expected = format!("a box with a volume within {lower:?} to {upper:?} m");
+            return Err(MeshError::parameter("boxes.regions", value, expected));
         }
         if region.cells.is_some_and(|cells| cells.contains(&0)) {
-            let expected = "at least one observation cell along every axis".to_owned();
-            return refuse("boxes.regions", format!("`{}`: {:?}", region.name, region.cells), expected);
+            let value = format!("`{}`: {:?}", region.name, region.cells);
+            let expected = "at least one observation cell along every axis";
+            return Err(MeshError::parameter("boxes.regions", value, expected));
         }
     }
     if let Some(size) = p.sizes.iter().find(|size| size.axis > 2) {
-        return refuse("boxes.sizes", format!("axis {}", size.axis), "axis 0, 1 or 2".into());
+        return Err(MeshError::parameter("boxes.sizes", format!("axis {}", size.axis), "axis 0, 1 or 2"));
     }
     Ok(())
 }
@@ -226,6 +217,10 @@ fn observation_cells<'a>(
     let mut is_in_one = vec![false; topology.tets().len()];
     for region in p.regions.iter().filter(|region| divided(&region.name)) {
         let counts = region.cells.unwrap_or([1; 3]);
+        let refuse = |expected: &str| {
+            let value = format!("`{}` with cells = {counts:?}", region.name);
+            MeshError::parameter("boxes.regions", value, expected)
+        };
         let lines: [Vec<usize>; 3] = [0, 1, 2].map(|d| {
             let ends = equal_parts([region.corners[0][d], region.corners[1][d]], counts[d]);
             ends.iter().map(|&at| grid.nearest_line(d, at)).collect()
@@ -236,14 +231,9 @@ fn observation_cells<'a>(
                 for k in lines[2].windows(2) {
                     let mut cell = grid.elements_within([[i[0], i[1]], [j[0], j[1]], [k[0], k[1]]]);
                     cell.retain(|e| topology.region_of()[e.index()] == id_of[region.name.as_str()]);
-                    let refuse = |expected: &str| {
-                        let value = format!("`{}` with cells = {counts:?}", region.name);
-                        MeshError::Parameter { parameter: "boxes.regions", value, expected: expected.into() }
-                    };
                     if cell.is_empty() {
-                        return Err(refuse(
-                            "a later box covers one of its observation cells; move one of them",
-                        ));
+                        let expected = "a later box covers one of its observation cells; move one of them";
+                        return Err(refuse(expected));
                     }
                     if cell.iter().any(|e| std::mem::replace(&mut is_in_one[e.index()], true)) {
                         let expected =

@@ -64,11 +64,8 @@ pub fn growing(
 ) -> Result<Vec<f64>, MeshError> {
     check_size(parameter, growth.first)?;
     if !(growth.ratio >= 1.0 && growth.ratio.is_finite()) {
-        return Err(MeshError::Parameter {
-            parameter,
-            value: growth.ratio.to_string(),
-            expected: "cells must grow by a finite ratio of at least 1".into(),
-        });
+        let expected = "cells must grow by a finite ratio of at least 1";
+        return Err(MeshError::parameter(parameter, growth.ratio, expected));
     }
     if growth.largest.is_nan() || growth.largest <= 0.0 {
         return Err(not_positive(parameter, growth.largest));
@@ -136,14 +133,11 @@ pub fn skin(
     let ascending = distances.windows(2).all(|pair| pair[0] < pair[1]);
     let fits = distances.iter().all(|&d| d > tolerance && (d < room - tolerance || meets(d)));
     if !ascending || !fits {
-        return Err(MeshError::Parameter {
-            parameter,
-            value: format!("{distances:?}"),
-            expected: format!(
-                "distances of mesh lines from a face must be positive and ascending, the last at most {room} m deep; \
-                 leave lines out or order them"
-            ),
-        });
+        let expected = format!(
+            "distances of mesh lines from a face must be positive and ascending, the last at most {room} m deep; \
+             leave lines out or order them"
+        );
+        return Err(MeshError::parameter(parameter, format!("{distances:?}"), expected));
     }
     let mut lines = vec![start];
     if skin == Skin::AtBothEnds {
@@ -183,11 +177,8 @@ fn check_interval(parameter: &'static str, [start, end]: [f64; 2]) -> Result<(),
     if start < end && start.is_finite() && end.is_finite() {
         return Ok(());
     }
-    Err(MeshError::Parameter {
-        parameter,
-        value: format!("[{start}, {end}]"),
-        expected: "an interval must have a finite positive length".into(),
-    })
+    let expected = "an interval must have a finite positive length";
+    Err(MeshError::parameter(parameter, format!("[{start}, {end}]"), expected))
 }
 
 fn check_size(parameter: &'static str, size: f64) -> Result<(), MeshError> {
@@ -195,21 +186,13 @@ fn check_size(parameter: &'static str, size: f64) -> Result<(), MeshError> {
 }
 
 fn not_positive(parameter: &'static str, size: f64) -> MeshError {
-    MeshError::Parameter {
-        parameter,
-        value: size.to_string(),
-        expected: "a mesh size must be positive and finite".into(),
-    }
+    MeshError::parameter(parameter, size, "a mesh size must be positive and finite")
 }
 
 fn too_many(parameter: &'static str, size: f64) -> MeshError {
-    MeshError::Parameter {
-        parameter,
-        value: size.to_string(),
-        expected: format!(
-            "this size needs more than {LINES_LIMIT} mesh lines along one axis; make it larger"
-        ),
-    }
+    let expected =
+        format!("this size needs more than {LINES_LIMIT} mesh lines along one axis; make it larger");
+    MeshError::parameter(parameter, size, expected)
 }
 
 #[cfg(test)]

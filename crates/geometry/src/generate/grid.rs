@@ -69,13 +69,10 @@ impl Grid {
         for (axis, line) in ["x", "y", "z"].iter().zip(&lines) {
             let ascending = line.windows(2).all(|pair| pair[0] < pair[1]);
             if line.len() < 2 || !ascending || line.iter().any(|c| !c.is_finite()) {
-                return Err(MeshError::Parameter {
-                    parameter,
-                    value: format!("{} lines along {axis}", line.len()),
-                    expected:
-                        "at least two finite, strictly ascending mesh lines are needed along every axis"
-                            .into(),
-                });
+                let value = format!("{} lines along {axis}", line.len());
+                let expected =
+                    "at least two finite, strictly ascending mesh lines are needed along every axis";
+                return Err(MeshError::parameter(parameter, value, expected));
             }
         }
         let cells = [0, 1, 2].map(|d| lines[d].len() - 1);
@@ -258,11 +255,8 @@ pub(crate) fn check_size(parameter: &'static str, cells: [usize; 3]) -> Result<(
     if tets <= TETS_LIMIT {
         return Ok(());
     }
-    Err(MeshError::Parameter {
-        parameter,
-        value: format!("{cells:?} cells, {tets} tetrahedra"),
-        expected: format!("at most {TETS_LIMIT} tetrahedra are made; use larger cells"),
-    })
+    let expected = format!("at most {TETS_LIMIT} tetrahedra are made; use larger cells");
+    Err(MeshError::parameter(parameter, format!("{cells:?} cells, {tets} tetrahedra"), expected))
 }
 
 #[cfg(test)]

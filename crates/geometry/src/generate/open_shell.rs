@@ -43,17 +43,15 @@ pub struct OpenShellParameters {
 pub fn open_shell(mesh: &Mesh, parameters: &OpenShellParameters) -> Result<Mesh, MeshError> {
     let topology = mesh.topology();
     if parameters.layers == 0 {
-        return Err(refuse("open.layers", "0", "at least one layer"));
+        return Err(MeshError::parameter("open.layers", 0, "at least one layer"));
     }
     let is_taken = topology.region_names().contains(&parameters.region)
         || topology.surface_names().any(|name| name == parameters.outer);
     if is_taken {
         let taken = format!("`{}` and `{}`", parameters.region, parameters.outer);
-        return Err(refuse(
-            "open",
-            &taken,
-            "a mesh without these names, which are those of the shell; one that has its shell already names it as the region of open space",
-        ));
+        let expected = "a mesh without these names, which are those of the shell; one that has its shell already names it as the \
+                        region of open space";
+        return Err(MeshError::parameter("open", taken, expected));
     }
     let faces = covered_faces(mesh, parameters)?;
     let layers = Layers::new(mesh, &faces, parameters);
@@ -87,10 +85,6 @@ pub fn open_shell(mesh: &Mesh, parameters: &OpenShellParameters) -> Result<Mesh,
     Mesh::new(Arc::new(grown.with_surface(&parameters.outer, outer)?), points)
 }
 
-fn refuse(parameter: &'static str, value: &str, expected: &str) -> MeshError {
-    MeshError::Parameter { parameter, value: value.to_owned(), expected: expected.to_owned() }
-}
-
 /// The outer faces on which the shell stands, by their key.
 fn covered_faces(
     mesh: &Mesh,
@@ -104,7 +98,8 @@ fn covered_faces(
         for &triangle in topology.surface(name)? {
             let key = face_key(triangle);
             let Some(facet) = outer.get(&key) else {
-                return Err(refuse("open.surfaces", name, "surfaces at the outside of the mesh"));
+                let expected = "surfaces at the outside of the mesh";
+                return Err(MeshError::parameter("open.surfaces", name, expected));
             };
             let vertices = facet.nodes.map(|n| sub(mesh.point(n), parameters.centre));
             if dot(normal(&vertices), vertices[0]) <= IN_PLANE * norm(normal(&vertices)) * norm(vertices[0]) {
@@ -112,13 +107,14 @@ fn covered_faces(
                 let expected = format!(
                     "a centre that sees every face from inside; that at {at} is not, or its plane holds the centre"
                 );
-                return Err(refuse("open.surfaces", name, &expected));
+                return Err(MeshError::parameter("open.surfaces", name, expected));
             }
             faces.insert(key, *facet);
         }
     }
     if faces.is_empty() {
-        return Err(refuse("open.surfaces", "[]", "the outer surfaces beyond which space is open"));
+        let expected = "the outer surfaces beyond which space is open";
+        return Err(MeshError::parameter("open.surfaces", "[]", expected));
     }
     Ok(faces)
 }
@@ -161,7 +157,7 @@ fn sides(
                     "all outer faces but symmetry planes through the centre; the face beside the shell at {at} is neither: \
                      open space begins there too, or the centre belongs into its plane"
                 );
-                return Err(refuse("open.surfaces", "a part of the outside", &expected));
+                return Err(MeshError::parameter("open.surfaces", "a part of the outside", expected));
             }
             edges_of.entry(face_key(facet.nodes)).or_default().push(edge);
         }

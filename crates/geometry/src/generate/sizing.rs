@@ -32,27 +32,23 @@ pub fn lines(
     limits: &[SizeLimit],
     growth: f64,
 ) -> Result<Vec<f64>, MeshError> {
-    let refuse = |value: String, expected: &str| {
-        Err(MeshError::Parameter { parameter, value, expected: expected.to_owned() })
-    };
     let [start, end] = axis;
     if !(start < end && start.is_finite() && end.is_finite()) {
-        return refuse(format!("[{start}, {end}]"), "an axis must have a finite positive length");
+        let expected = "an axis must have a finite positive length";
+        return Err(MeshError::parameter(parameter, format!("[{start}, {end}]"), expected));
     }
     if !(growth > 1.0 && growth.is_finite()) {
-        return refuse(growth.to_string(), "cells must grow by a finite ratio above 1");
+        return Err(MeshError::parameter(parameter, growth, "cells must grow by a finite ratio above 1"));
     }
     // Breakpoints closer than this are one: decimal lengths differ in their last bits.
     let tolerance = 1e-9 * (end - start);
     for SizeLimit { interval: [low, high], size } in limits {
         if !(low <= high && *low >= start - tolerance && *high <= end + tolerance) {
-            return refuse(
-                format!("[{low}, {high}] m"),
-                &format!("lower end first, within the mesh, which goes from {start} m to {end} m"),
-            );
+            let expected = format!("lower end first, within the mesh, which goes from {start} m to {end} m");
+            return Err(MeshError::parameter(parameter, format!("[{low}, {high}] m"), expected));
         }
         if size.is_nan() || *size <= 0.0 {
-            return refuse(format!("{size} m"), "a mesh size must be positive");
+            return Err(MeshError::parameter(parameter, format!("{size} m"), "a mesh size must be positive"));
         }
     }
     let mut breakpoints = vec![start, end];
@@ -64,10 +60,10 @@ pub fn lines(
         let profile = Profile::between([pair[0], pair[1]], limits, growth, tolerance);
         let cells = (profile.cells() - 0.05).ceil().max(1.0);
         if cells + lines.len() as f64 > LINES_LIMIT as f64 {
-            return refuse(
-                format!("{cells} cells between {} m and {} m", pair[0], pair[1]),
-                &format!("at most {LINES_LIMIT} mesh lines along one axis are made; use larger sizes"),
-            );
+            let value = format!("{cells} cells between {} m and {} m", pair[0], pair[1]);
+            let expected =
+                format!("at most {LINES_LIMIT} mesh lines along one axis are made; use larger sizes");
+            return Err(MeshError::parameter(parameter, value, expected));
         }
         let parts = cells as usize;
         lines.extend((1..parts).map(|i| pair[0] + profile.distance(i as f64 / cells)));

@@ -197,11 +197,8 @@ fn air_radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
     // The layer that would leave less than half of itself inside is not begun.
     while reached.is_empty() || room - sum > 0.5 * layer {
         if reached.len() == LINES_LIMIT {
-            return Err(MeshError::Parameter {
-                parameter: "sphere.air_layer",
-                value: format!("{layer} m"),
-                expected: format!("at most {LINES_LIMIT} layers are made; use thicker ones"),
-            });
+            let expected = format!("at most {LINES_LIMIT} layers are made; use thicker ones");
+            return Err(MeshError::parameter("sphere.air_layer", format!("{layer} m"), expected));
         }
         sum += layer;
         reached.push(sum);
@@ -214,35 +211,32 @@ fn air_radii(p: &SphereParameters, n: usize) -> Result<Vec<f64>, MeshError> {
 }
 
 fn check(p: &SphereParameters) -> Result<(), MeshError> {
-    let refuse = |parameter, value: String, expected: &str| {
-        Err(MeshError::Parameter { parameter, value, expected: expected.to_owned() })
-    };
     let positive = |value: f64| value > 0.0 && value.is_finite();
     if !positive(p.radius) {
-        return refuse("sphere.radius", format!("{} m", p.radius), "a positive radius");
+        return Err(MeshError::parameter("sphere.radius", format!("{} m", p.radius), "a positive radius"));
     }
     if let Some(inner) = p.inner_radius.filter(|&inner| !(positive(inner) && inner < p.radius)) {
         let expected = format!("a positive radius below that of the sphere, {} m", p.radius);
-        return refuse("sphere.inner_radius", format!("{inner} m"), &expected);
+        return Err(MeshError::parameter("sphere.inner_radius", format!("{inner} m"), expected));
     }
     if !(p.outer_radius.is_finite() && p.outer_radius > p.radius) {
         let expected = format!("a radius beyond that of the sphere, {} m", p.radius);
-        return refuse("sphere.outer_radius", format!("{} m", p.outer_radius), &expected);
+        return Err(MeshError::parameter("sphere.outer_radius", format!("{} m", p.outer_radius), expected));
     }
     if p.divisions == 0 {
-        return refuse("sphere.divisions", "0".into(), "at least one cell");
+        return Err(MeshError::parameter("sphere.divisions", 0, "at least one cell"));
     }
     if p.wall_layers == 0 {
-        return refuse("sphere.wall_layers", "0".into(), "at least one layer");
+        return Err(MeshError::parameter("sphere.wall_layers", 0, "at least one layer"));
     }
     if let Some(layer) = p.air_layer.filter(|&layer| !positive(layer)) {
-        return refuse("sphere.air_layer", format!("{layer} m"), "a positive thickness");
+        return Err(MeshError::parameter("sphere.air_layer", format!("{layer} m"), "a positive thickness"));
     }
     if !(p.growth >= 1.0 && p.growth.is_finite()) {
-        return refuse("sphere.growth", p.growth.to_string(), "a finite ratio of at least 1");
+        return Err(MeshError::parameter("sphere.growth", p.growth, "a finite ratio of at least 1"));
     }
     if !positive(p.refinement) {
-        return refuse("sphere.refinement", p.refinement.to_string(), "a positive number");
+        return Err(MeshError::parameter("sphere.refinement", p.refinement, "a positive number"));
     }
     Ok(())
 }
