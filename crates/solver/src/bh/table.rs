@@ -412,4 +412,27 @@ mod tests {
         let saturated = 1.8 + VACUUM_PERMEABILITY * (1e5 - 500.0);
         assert_eq!((falling(saturated), falling(saturated - 0.01)), (None, None));
     }
+
+    #[test]
+    fn the_tangent_is_the_derivative_of_the_field_strength() {
+        let curve = BhCurve::new(&saturating(24)).expect("a sound table");
+        for b in [[0.3, -0.2, 0.5], [1.2, 0.9, -1.1], [2.0, 1.0, 1.5], [1e-4, 0.0, 0.0]] {
+            let tangent = curve.tangent(b);
+            for j in 0..3 {
+                let moved = |s: f64| {
+                    let mut b = b;
+                    b[j] += s;
+                    curve.field_strength(b)
+                };
+                for i in 0..3 {
+                    let difference = central(|s| moved(s)[i], 0.0, 1e-7);
+                    assert!((difference - tangent[i][j]).abs() < 1e-4 * tangent[0][0].abs(), "{b:?} {i} {j}");
+                }
+            }
+        }
+        // At zero the material is linear, with the slope of the first two points.
+        let [h, b] = saturating(24)[1];
+        assert_eq!(curve.tangent([0.0; 3])[1], [0.0, h / b, 0.0]);
+        assert_eq!(curve.field_strength([0.0; 3]), [0.0; 3]);
+    }
 }
