@@ -27,7 +27,8 @@ const OUTER_FACES: [(&str, usize, bool); 6] = [
 ];
 
 /// Paths along the axes from the lowest to the highest corner; the first three are even permutations.
-const PATHS: [[usize; 3]; TETS_PER_CELL] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
+pub(super) const PATHS: [[usize; 3]; TETS_PER_CELL] =
+    [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
 /// A box in which the cells of a grid are divided along every axis: each new cell lies in one old one.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use crate::error::MeshError;
 use crate::generate::grading::{self, LINES_LIMIT, Skin};
-use crate::generate::grid::{TETS_LIMIT, TETS_PER_CELL};
+use crate::generate::grid::{PATHS, TETS_PER_CELL, check_size};
 use crate::generate::sphere_nodes::Numbering;
 use crate::ids::{NodeId, RegionId};
 use crate::mesh::Mesh;
@@ -65,9 +65,6 @@ const CAVITY: RegionId = RegionId(2);
 
 /// Largest thickness of a layer outside over the length of its cells: thicker ones would have a quality below 0.1.
 const THICKEST: f64 = 3.5;
-
-/// Paths along the axes of a cell from its lowest to its highest corner.
-const PATHS: [[usize; 3]; TETS_PER_CELL] = [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]];
 
 /// The mesh of a sphere: the octant `x, y, z ≥ 0`.
 ///
@@ -127,7 +124,7 @@ impl SphereParameters {
     /// As [`sphere`].
     pub fn tet_count(&self) -> Result<usize, MeshError> {
         let (n, radii) = shells(self)?;
-        Ok(TETS_PER_CELL * n * n * (n + 3 * (radii.len() - 1 - n)))
+        Ok(TETS_PER_CELL * cells(n, &radii).iter().product::<usize>())
     }
 }
 
@@ -136,8 +133,13 @@ fn shells(parameters: &SphereParameters) -> Result<(usize, Vec<f64>), MeshError>
     check(parameters)?;
     let n = ((parameters.divisions as f64 * parameters.refinement).round() as usize).max(1);
     let radii = radii(parameters, n)?;
-    check_size(n, radii.len() - n)?;
+    check_size("sphere.divisions", cells(n, &radii))?;
     Ok((n, radii))
+}
+
+/// The cells as those of a box: the three faces of the cube go on in layers.
+fn cells(n: usize, radii: &[f64]) -> [usize; 3] {
+    [n, n, (radii.len() - 1 - n).saturating_mul(3).saturating_add(n)]
 }
 
 /// The point of a face of the cube that is `n` along its axis; the other two follow in cyclic order.
@@ -239,21 +241,6 @@ fn check(p: &SphereParameters) -> Result<(), MeshError> {
         return Err(MeshError::parameter("sphere.refinement", p.refinement, "a positive number"));
     }
     Ok(())
-}
-
-/// Refuses too many cells before anything is allocated for them.
-fn check_size(n: usize, layers: usize) -> Result<(), MeshError> {
-    let (n, layers) = (n as u64, layers as u64);
-    let cells = n.saturating_mul(n).saturating_mul(n.saturating_add(layers.saturating_mul(3)));
-    let tets = cells.saturating_mul(TETS_PER_CELL as u64);
-    if tets <= TETS_LIMIT {
-        return Ok(());
-    }
-    Err(MeshError::Parameter {
-        parameter: "sphere.divisions",
-        value: format!("{n} with {layers} layers, {tets} tetrahedra"),
-        expected: format!("at most {TETS_LIMIT} tetrahedra are made; use fewer divisions"),
-    })
 }
 
 /// Names the symmetry planes, the outside, and the faces of the region `sphere`.
