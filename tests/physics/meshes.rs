@@ -1,7 +1,5 @@
 //! Boxes of Kuhn tetrahedra with distorted nodes.
 
-use std::sync::Arc;
-
 use fluxmorph_geometry::generate::Grid;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, RegionId};
@@ -12,8 +10,7 @@ pub(crate) const FACES: [&str; 6] = ["x_min", "x_max", "y_min", "y_max", "z_min"
 /// A mesh of three sets of lines [m] and its regions.
 pub(crate) fn boxed(lines: [Vec<f64>; 3], regions: &[&str], paint: impl Fn(Point) -> u32) -> (Grid, Mesh) {
     let grid = Grid::new("mesh", lines).expect("ascending lines");
-    let topology = grid.topology(regions, |centre| RegionId(paint(centre))).expect("a grid conforms");
-    let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("cells have a volume");
+    let mesh = grid.mesh(regions, |centre| RegionId(paint(centre))).expect("a grid conforms");
     (grid, mesh)
 }
 

@@ -205,16 +205,13 @@ mod tests {
     use fluxmorph_geometry::topology::face_key;
     use fluxmorph_geometry::{Mesh, RegionId};
     use std::collections::HashSet;
-    use std::sync::Arc;
 
     /// A cube of `n³` cells without those that `is_hole` names by their numbers along the axes.
     fn cube(n: usize, is_hole: impl Fn([usize; 3]) -> bool) -> Mesh {
         let line = || (0..=n).map(|i| i as f64).collect::<Vec<_>>();
         let grid = Grid::new("grid", [line(), line(), line()]).expect("a grid");
         let hole = |x: [f64; 3]| is_hole(x.map(|c| c as usize));
-        let topology =
-            grid.topology(&["air", "hole"], |x| RegionId(u32::from(hole(x)))).expect("two regions");
-        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+        let mesh = grid.mesh(&["air", "hole"], |x| RegionId(u32::from(hole(x)))).expect("two regions");
         mesh.without_region(RegionId(1)).expect("what is left").0
     }
 

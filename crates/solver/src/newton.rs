@@ -260,19 +260,14 @@ fn least_settled(
 
 #[cfg(test)]
 mod tests {
-    use fluxmorph_geometry::RegionId;
-    use fluxmorph_geometry::generate::Grid;
-    use std::sync::Arc;
+    use fluxmorph_geometry::generate::{BlockParameters, block};
 
     use super::*;
     use crate::{FieldModelSetup, Material};
 
     #[test]
     fn a_step_is_as_exact_as_the_next_residual_is_small_and_the_last_one_needs() {
-        let line = || vec![0.0, 0.1, 0.2];
-        let grid = Grid::new("grid", [line(), line(), line()]).expect("a grid");
-        let topology = grid.topology(&["air"], |_| RegionId(0)).expect("a topology");
-        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+        let mesh = block(&BlockParameters { size: [0.2; 3], cells: [2; 3] }).expect("a mesh");
         let setup = FieldModelSetup { materials: vec![Material::AIR], ..FieldModelSetup::default() };
         let model = FieldModel::new(&mesh, setup).expect("a sound problem");
         let goals = [3.0, 1e-4, 1e-7, 2e-11].map(|residual| goal_of_a_step(&model, residual));

@@ -153,10 +153,7 @@ impl<'a> StepSystems<'a> {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
-    use fluxmorph_geometry::generate::Grid;
-    use fluxmorph_geometry::{Mesh, RegionId};
+    use fluxmorph_geometry::generate::{BlockParameters, block};
 
     use super::*;
     use crate::linear::Method;
@@ -181,10 +178,7 @@ mod tests {
 
     #[test]
     fn rounding_takes_the_next_method_until_there_is_none_and_a_law_does_not() {
-        let line = || vec![0.0, 0.1, 0.2];
-        let grid = Grid::new("grid", [line(), line(), line()]).expect("a grid");
-        let topology = grid.topology(&["air"], |_| RegionId(0)).expect("a topology");
-        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+        let mesh = block(&BlockParameters { size: [0.2; 3], cells: [2; 3] }).expect("a mesh");
         let setup = FieldModelSetup { materials: vec![Material::AIR], ..FieldModelSetup::default() };
         let model = FieldModel::new(&mesh, setup).expect("a sound problem");
         let failed = |failure| SolverError::Newton {

@@ -139,9 +139,7 @@ mod tests {
         let line = || (0..=3).map(f64::from).collect::<Vec<_>>();
         let grid = Grid::new("grid", [line(), line(), line()]).expect("a grid");
         let hole = |x: [f64; 3]| x.iter().all(|c| (1.0..2.0).contains(c));
-        let topology =
-            grid.topology(&["air", "hole"], |x| RegionId(u32::from(hole(x)))).expect("two regions");
-        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("a mesh");
+        let mesh = grid.mesh(&["air", "hole"], |x| RegionId(u32::from(hole(x)))).expect("two regions");
         let (mesh, exposed) = mesh.without_region(RegionId(1)).expect("what is left");
         let all: HashSet<_> = mesh.topology().outer_facets().map(|facet| face_key(facet.nodes)).collect();
         let keys =

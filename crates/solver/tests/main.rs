@@ -19,8 +19,6 @@ mod sources;
 mod transmission;
 mod two_level;
 
-use std::sync::Arc;
-
 use fluxmorph_geometry::generate::{Grid, ShieldParameters, shield};
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, RegionId};
@@ -51,8 +49,7 @@ fn lines(count: usize, size: f64) -> Vec<f64> {
 /// A mesh of three sets of lines [m], with the region of every cell by its middle.
 fn painted(lines: [Vec<f64>; 3], regions: &[&str], paint: impl Fn(Point) -> u32) -> Mesh {
     let grid = Grid::new("grid", lines).expect("ascending lines");
-    let topology = grid.topology(regions, |x| RegionId(paint(x))).expect("a grid conforms");
-    Mesh::new(Arc::new(topology), grid.points()).expect("cells have a volume")
+    grid.mesh(regions, |x| RegionId(paint(x))).expect("a grid conforms")
 }
 
 /// A square of 2 m and a height of 0.1 m in cells of 0.1 m, with a block in the quarter x > 0, y < 0 and a region far from the coil

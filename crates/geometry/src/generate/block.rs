@@ -1,7 +1,5 @@
 //! A plain block of equal cells (the paper's example 1: mesh regeneration alone).
 
-use std::sync::Arc;
-
 use crate::error::MeshError;
 use crate::generate::grading::equal_parts;
 use crate::generate::grid::{Grid, check_size};
@@ -28,9 +26,7 @@ impl Default for BlockParameters {
 /// # Errors
 /// [`MeshError::Parameter`] names `block.size` or `block.cells`.
 pub fn block(parameters: &BlockParameters) -> Result<Mesh, MeshError> {
-    let grid = grid(parameters)?;
-    let topology = grid.topology(&["block"], |_| RegionId(0))?;
-    Mesh::new(Arc::new(topology), grid.points())
+    grid(parameters)?.mesh(&["block"], |_| RegionId(0))
 }
 
 impl BlockParameters {

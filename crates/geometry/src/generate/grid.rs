@@ -4,9 +4,12 @@
 //! axes. All cells are cut alike, so the diagonals of a face shared by two cells coincide and the mesh conforms.
 //! Surfaces are found by line numbers, never by comparing coordinates.
 
+use std::sync::Arc;
+
 use super::grading;
 use crate::error::MeshError;
 use crate::ids::{ElementId, NodeId, RegionId};
+use crate::mesh::Mesh;
 use crate::tet4::Point;
 use crate::topology::Topology;
 
@@ -202,6 +205,14 @@ impl Grid {
         Ok(topology)
     }
 
+    /// The mesh with this connectivity and these coordinates.
+    ///
+    /// # Errors
+    /// As [`Grid::topology`].
+    pub fn mesh(&self, region_names: &[&str], paint: impl Fn(Point) -> RegionId) -> Result<Mesh, MeshError> {
+        Mesh::new(Arc::new(self.topology(region_names, paint)?), self.points())
+    }
+
     /// Triangles of a region's boundary that lie on one line of an axis (a plane), oriented out of the region.
     pub fn region_surface(
         &self,
@@ -262,18 +273,10 @@ pub(crate) fn check_size(parameter: &'static str, cells: [usize; 3]) -> Result<(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use proptest::prelude::*;
 
     use super::*;
-    use crate::mesh::Mesh;
     use crate::tet4;
-
-    fn mesh_of(grid: &Grid) -> Mesh {
-        let topology = grid.topology(&["all"], |_| RegionId(0)).expect("a grid conforms");
-        Mesh::new(Arc::new(topology), grid.points()).expect("right-handed")
-    }
 
     fn area(mesh: &Mesh, triangles: &[[NodeId; 3]]) -> Point {
         let mut sum = [0.0; 3];
@@ -299,7 +302,7 @@ mod tests {
         fn any_grid_fills_its_box_and_closes_its_surface(x in lines(), y in lines(), z in lines()) {
             let size = [&x, &y, &z].map(|l| l[l.len() - 1] - l[0]);
             let grid = Grid::new("grid", [x, y, z]).expect("ascending lines");
-            let mesh = mesh_of(&grid);
+            let mesh = grid.mesh(&["all"], |_| RegionId(0)).expect("a grid conforms");
             let volume: f64 = mesh.topology().elements().map(|e| tet4::volume(mesh.vertices(e))).sum();
             let box_volume: f64 = size.iter().product();
             prop_assert!((volume / box_volume - 1.0).abs() < 1e-12);
@@ -335,9 +338,7 @@ mod tests {
     #[test]
     fn the_surface_of_a_region_points_out_of_it_from_either_side() {
         let grid = Grid::new("grid", [vec![0.0, 1.0], vec![0.0, 2.0], vec![0.0, 1.0, 2.0]]).expect("grid");
-        let topology =
-            grid.topology(&["low", "high"], |c| RegionId(u32::from(c[2] > 1.0))).expect("a grid conforms");
-        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("right-handed");
+        let mesh = grid.mesh(&["low", "high"], |c| RegionId(u32::from(c[2] > 1.0))).expect("a grid conforms");
         let low = grid.region_surface(mesh.topology(), RegionId(0), 2, 1);
         let high = grid.region_surface(mesh.topology(), RegionId(1), 2, 1);
         assert_eq!((area(&mesh, &low), area(&mesh, &high)), ([0.0, 0.0, 2.0], [0.0, 0.0, -2.0]));

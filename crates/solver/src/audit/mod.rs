@@ -284,7 +284,6 @@ fn mean_square_edge(vertices: [Point; 4]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
 
     use fluxmorph_geometry::generate::Grid;
 
@@ -303,8 +302,7 @@ mod tests {
             !(0.0..0.02).contains(&x[0]) || !(0.0..0.02).contains(&x[1]) || !(0.0..0.008).contains(&x[2])
         };
         let region = |x: Point| RegionId(if is_air(x) { 0 } else { part(x) });
-        let topology = grid.topology(&["air", "first", "second"], region).expect("regions");
-        Mesh::new(Arc::new(topology), grid.points()).expect("a mesh")
+        grid.mesh(&["air", "first", "second"], region).expect("regions")
     }
 
     fn audit(mesh: &Mesh, region: u32, alike: &[u32]) -> SkinAudit {

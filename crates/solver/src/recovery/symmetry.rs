@@ -162,9 +162,8 @@ mod tests {
     fn odd(boundaries: &[(&str, Boundary)]) -> Vec<Point> {
         let grid = Grid::new("grid", [(); 3].map(|()| vec![0.0, 1.0, 2.0, 3.0])).expect("ascending lines");
         let corner = |x: Point| RegionId(u32::from(x.iter().all(|c| *c < 1.0)));
-        let topology = grid.topology(&["rest", "corner"], corner).expect("a grid conforms");
-        let cell = topology.elements_of(RegionId(1));
-        let mesh = Mesh::new(Arc::new(topology), grid.points()).expect("cells have a volume");
+        let mesh = grid.mesh(&["rest", "corner"], corner).expect("a grid conforms");
+        let cell = mesh.topology().elements_of(RegionId(1));
         let boundaries: Vec<(String, Boundary)> =
             boundaries.iter().map(|(name, boundary)| ((*name).to_owned(), *boundary)).collect();
         let conditions = conditions(mesh.topology(), &boundaries).expect("sides of the grid");
