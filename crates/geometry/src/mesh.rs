@@ -120,33 +120,3 @@ impl Mesh {
         Ok((Self::new(Arc::new(left.topology), points)?, left.exposed))
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::ids::RegionId;
-
-    fn unit_tet() -> Mesh {
-        let topology =
-            Topology::new(4, vec![[0, 1, 2, 3].map(NodeId)], vec!["all".into()], vec![RegionId(0)])
-                .expect("one tet");
-        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        Mesh::new(Arc::new(topology), points).expect("right-handed")
-    }
-
-    #[test]
-    fn a_motion_that_inverts_is_refused_and_names_the_element() {
-        let mut displacement = vec![[0.0; 3]; 4];
-        displacement[3][2] = -2.0;
-        let err = unit_tet().moved(&displacement).unwrap_err();
-        assert!(matches!(err, MeshError::Inverted { element: ElementId(0), .. }), "{err}");
-    }
-
-    #[test]
-    fn a_point_that_is_not_finite_is_refused() {
-        let mut displacement = vec![[0.0; 3]; 4];
-        displacement[2][1] = f64::NAN;
-        let err = unit_tet().moved(&displacement).unwrap_err();
-        assert!(matches!(err, MeshError::NotFinite { node: NodeId(2), .. }), "{err}");
-    }
-}
