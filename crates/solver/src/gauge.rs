@@ -8,6 +8,7 @@
 
 use fluxmorph_geometry::NodeId;
 use fluxmorph_geometry::disjoint_sets::DisjointSets;
+use fluxmorph_geometry::incidence::Incidence;
 
 /// Which edges are branches of the tree.
 ///
@@ -20,22 +21,9 @@ pub(crate) fn tree(vertex_count: usize, edges: &[[NodeId; 2]], is_kept: impl Fn(
         }
     }
     // Ends of every edge in the graph of the sets, and the edges around each set.
-    let ends: Vec<[usize; 2]> = edges.iter().map(|edge| edge.map(|n| sets.root(n.index()))).collect();
-    let mut starts = vec![0usize; vertex_count + 1];
-    for &set in ends.iter().flatten() {
-        starts[set + 1] += 1;
-    }
-    for set in 0..vertex_count {
-        starts[set + 1] += starts[set];
-    }
-    let mut around = vec![0u32; starts[vertex_count]];
-    let mut next = starts.clone();
-    for (e, sets) in ends.iter().enumerate() {
-        for &set in sets {
-            around[next[set]] = e as u32;
-            next[set] += 1;
-        }
-    }
+    let ends: Vec<[NodeId; 2]> =
+        edges.iter().map(|edge| edge.map(|n| NodeId::new(sets.root(n.index())))).collect();
+    let incidence = Incidence::new(vertex_count, &ends);
     // The largest set first: the tree grows from it on all sides.
     let mut sizes = vec![0usize; vertex_count];
     (0..vertex_count).for_each(|n| sizes[sets.root(n)] += 1);
@@ -51,11 +39,11 @@ pub(crate) fn tree(vertex_count: usize, edges: &[[NodeId; 2]], is_kept: impl Fn(
         }
         queue.push_back(first);
         while let Some(set) = queue.pop_front() {
-            for &e in &around[starts[set]..starts[set + 1]] {
-                let [a, b] = ends[e as usize];
+            for e in incidence.around(NodeId::new(set)).iter().map(|e| e.index()) {
+                let [a, b] = ends[e].map(NodeId::index);
                 let other = if a == set { b } else { a };
                 if !std::mem::replace(&mut reached[other], true) {
-                    is_branch[e as usize] = true;
+                    is_branch[e] = true;
                     queue.push_back(other);
                 }
             }

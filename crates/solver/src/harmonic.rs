@@ -9,6 +9,9 @@
 
 use std::collections::{BTreeMap, VecDeque};
 
+use fluxmorph_geometry::CarrierId;
+use fluxmorph_geometry::incidence::Incidence;
+
 /// `2³¹ − 1`: coefficients are small, and products fit in 64 bits.
 const PRIME: u64 = (1 << 31) - 1;
 
@@ -32,7 +35,9 @@ pub(crate) fn fields(
     triangles: &[[usize; 3]],
     is_zero: impl Fn(usize) -> bool,
 ) -> Vec<HarmonicField> {
-    let mut search = Search::new(edge_count, triangles);
+    let edges: Vec<_> = triangles.iter().map(|edges| edges.map(CarrierId::new)).collect();
+    let around = Incidence::new(edge_count, &edges);
+    let mut search = Search::new(edge_count, triangles, &around);
     (0..edge_count).filter(|&e| is_zero(e)).for_each(|e| search.determine(e, Sum::new()));
     search.propagate();
     let mut generators = Vec::new();
@@ -56,8 +61,8 @@ pub(crate) fn fields(
 
 struct Search<'a> {
     triangles: &'a [[usize; 3]],
-    /// Triangles around every edge, in compressed rows.
-    around: (Vec<usize>, Vec<usize>),
+    /// Triangles around every edge.
+    around: &'a Incidence,
     values: Vec<Option<Sum>>,
     /// Open edges of every triangle.
     open: Vec<u8>,
@@ -70,20 +75,10 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    fn new(edge_count: usize, triangles: &'a [[usize; 3]]) -> Self {
-        let mut starts = vec![0; edge_count + 1];
-        triangles.iter().flatten().for_each(|&e| starts[e + 1] += 1);
-        (0..edge_count).for_each(|e| starts[e + 1] += starts[e]);
-        let (mut next, mut around) = (starts.clone(), vec![0; 3 * triangles.len()]);
-        for (t, edges) in triangles.iter().enumerate() {
-            for &e in edges {
-                around[next[e]] = t;
-                next[e] += 1;
-            }
-        }
+    fn new(edge_count: usize, triangles: &'a [[usize; 3]], around: &'a Incidence) -> Self {
         Self {
             triangles,
-            around: (starts, around),
+            around,
             values: vec![None; edge_count],
             open: vec![3; triangles.len()],
             ready: Vec::new(),
@@ -96,8 +91,7 @@ impl<'a> Search<'a> {
     /// Gives an edge its value, and takes the relations of the triangles that this closes.
     fn determine(&mut self, edge: usize, value: Sum) {
         self.values[edge] = Some(value);
-        for i in self.around.0[edge]..self.around.0[edge + 1] {
-            let t = self.around.1[i];
+        for t in self.around.around(CarrierId::new(edge)).iter().map(|t| t.index()) {
             self.open[t] -= 1;
             match self.open[t] {
                 2 => self.half.push_back(t),

@@ -284,7 +284,6 @@ fn mean_square_edge(vertices: [Point; 4]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-
     use fluxmorph_geometry::generate::Grid;
 
     use super::*;
