@@ -64,10 +64,7 @@ pub fn conjugate_gradients(
         );
         iterations += done;
         let before = residual;
-        matrix.mul(&x, &mut r);
-        for (r, b) in r.iter_mut().zip(right_side) {
-            *r = b - *r;
-        }
+        r = matrix.residual(&x, right_side);
         residual = norm(&r) / scale;
         if residual <= tolerance
             || residual * scale <= ROUNDING * f64::EPSILON * magnitude(matrix, &x, right_side)

@@ -122,6 +122,17 @@ impl<T: Scalar> CsrMatrix<T> {
         });
     }
 
+    /// `b − A x`.
+    ///
+    /// # Panics
+    /// If `x` or `b` does not fit the matrix.
+    pub fn residual<X: RowProduct<T>>(&self, x: &[X], b: &[X]) -> Vec<X> {
+        let mut r = vec![X::default(); b.len()];
+        self.mul(x, &mut r);
+        r.par_iter_mut().with_min_len(ROWS_PER_TASK).zip(b).for_each(|(r, &b)| *r = b - *r);
+        r
+    }
+
     /// `Aᵀ x`, overwriting `y`; serial, for the few rectangular products of the method.
     ///
     /// # Panics

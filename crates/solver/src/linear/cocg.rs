@@ -28,11 +28,7 @@ pub fn solve(
     mut stop: impl FnMut(usize, f64) -> bool,
 ) -> Outcome {
     let n = x.len();
-    let mut residual = vec![c64::default(); n];
-    matrix.mul(x, &mut residual);
-    for (r, b) in residual.iter_mut().zip(right_side) {
-        *r = b - *r;
-    }
+    let mut residual = matrix.residual(x, right_side);
     let mut direction = vec![c64::default(); n];
     let mut preconditioned = vec![c64::default(); n];
     let mut image = vec![c64::default(); n];

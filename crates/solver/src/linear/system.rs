@@ -269,7 +269,7 @@ impl LocalSystem {
                 Attempt::TooSlow => unreachable!("an own factor is never too slow"),
             }
             // What a failed iteration leaves may be farther from the solution than zero, or no number.
-            let left = norm(&self.residual(right_side, &x));
+            let left = norm(&self.matrix.residual(&x, right_side));
             if left.is_nan() || left >= scale {
                 x.fill(c64::default());
             }
@@ -300,7 +300,9 @@ impl LocalSystem {
     fn start(&mut self, right_side: &[c64], scale: f64) -> Vec<c64> {
         let position = self.solutions.len();
         match self.before.get_mut(position).map(std::mem::take) {
-            Some(x) if x.len() == right_side.len() && norm(&self.residual(right_side, &x)) < scale => x,
+            Some(x) if x.len() == right_side.len() && norm(&self.matrix.residual(&x, right_side)) < scale => {
+                x
+            }
             _ => vec![c64::default(); right_side.len()],
         }
     }
@@ -348,7 +350,7 @@ impl LocalSystem {
                 return Attempt::TooSlow;
             }
             let before = residual;
-            residual = norm(&self.residual(right_side, x)) / scale;
+            residual = norm(&self.matrix.residual(x, right_side)) / scale;
             let settled = residual <= goal.required || outcome.iterations == 0;
             if settled || !residual.is_finite() || residual > 0.1 * before {
                 break;
@@ -410,22 +412,12 @@ impl LocalSystem {
         let is_last = |method: Method| method.is_complete() && self.analysis.more_robust(method).is_none();
         let own = self.preconditioner.as_ref().filter(|own| is_last(own.method));
         let Some(factor) = own.filter(|_| self.origin == Origin::Own) else { return false };
-        let residual = self.residual(right_side, x);
+        let residual = self.matrix.residual(x, right_side);
         let mut step = vec![c64::default(); x.len()];
         factor.apply(&residual, &mut step);
         let left =
             Left { matrix: &self.matrix, load: right_side, solution: x, residual: &residual, step: &step };
         left.is_rounding(self.goal_now().required)
-    }
-
-    /// `b − K x`.
-    fn residual(&self, right_side: &[c64], x: &[c64]) -> Vec<c64> {
-        let mut r = vec![c64::default(); x.len()];
-        self.matrix.mul(x, &mut r);
-        for (r, b) in r.iter_mut().zip(right_side) {
-            *r = b - *r;
-        }
-        r
     }
 }
 

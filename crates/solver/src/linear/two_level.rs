@@ -29,9 +29,6 @@ use super::method::Method;
 use super::transfer::Transfer;
 use crate::elements::{ElementFamily, Order};
 
-/// Rows per parallel task.
-const ROWS: usize = 1024;
-
 /// What the diagonal is multiplied by before the incomplete factorisation. Between 1.0 and 1.05 the iterations hardly change.
 const DIAGONAL_FACTOR: f64 = 1.02;
 
@@ -222,9 +219,7 @@ impl TwoLevel {
 
     /// Moves `x` so that the residual `b − K x` has no coarse part: where a deflated iteration starts.
     pub(super) fn start(&self, matrix: &CsrMatrix<c64>, b: &[c64], x: &mut [c64]) {
-        let mut rest = vec![c64::default(); b.len()];
-        matrix.mul(x, &mut rest);
-        subtract_from(b, &mut rest);
+        let rest = matrix.residual(x, b);
         self.add_coarse_solution(&self.analysis.transfer.restrict(&rest), x);
     }
 
@@ -234,10 +229,7 @@ impl TwoLevel {
         let rest = match &self.smoother {
             Smoother::Incomplete(factor, restricted) => {
                 factor.apply(r, z);
-                let mut rest = vec![c64::default(); transfer.coarse_count()];
-                restricted.mul(z, &mut rest);
-                subtract_from(&transfer.restrict(r), &mut rest);
-                rest
+                restricted.residual(z, &transfer.restrict(r))
             }
             Smoother::GaussSeidel(own) => {
                 let mut rest = vec![c64::default(); r.len()];
@@ -261,11 +253,4 @@ fn single(matrix: &CsrMatrix<c64>) -> CsrMatrix<c32> {
     let value = |value: &c64| c32::new(value.re as f32, value.im as f32);
     let values = matrix.values.par_iter().map(value).collect();
     CsrMatrix { structure: Arc::clone(&matrix.structure), values }
-}
-
-/// `rest ← r − rest`.
-fn subtract_from(r: &[c64], rest: &mut [c64]) {
-    rest.par_chunks_mut(ROWS).zip(r.par_chunks(ROWS)).for_each(|(rest, r)| {
-        rest.iter_mut().zip(r).for_each(|(rest, r)| *rest = r - *rest);
-    });
 }
