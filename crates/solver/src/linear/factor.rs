@@ -21,6 +21,9 @@ pub(super) trait Precondition: std::fmt::Debug + Send + Sync {
     /// Bytes held.
     fn bytes(&self) -> usize;
 
+    /// Moves an initial guess to where the iteration may start.
+    fn start(&self, _matrix: &CsrMatrix<c64>, _b: &[c64], _x: &mut [c64]) {}
+
     /// What the factor of another matrix of the pattern may begin with.
     fn kept(&self) -> Option<KeptPart> {
         None

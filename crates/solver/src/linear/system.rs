@@ -182,7 +182,7 @@ impl LocalSystem {
 
     /// Bytes of the preconditioner.
     pub fn preconditioner_bytes(&self) -> usize {
-        self.preconditioner.as_ref().map_or(0, |own| own.bytes())
+        self.preconditioner.as_ref().map_or(0, |own| own.action.bytes())
     }
 
     /// What the solver did beside solving.
@@ -214,7 +214,7 @@ impl LocalSystem {
     pub fn into_cache(mut self) -> LinearSolverCache {
         let method = self.preconditioner.as_ref().map(|p| p.method).filter(|&m| m != self.analysis.method());
         let is_within_a_state = self.is_within_a_state;
-        let kept = self.preconditioner.as_ref().and_then(|own| own.kept()).or(self.kept.take());
+        let kept = self.preconditioner.as_ref().and_then(|own| own.action.kept()).or(self.kept.take());
         if self.reuse() == Reuse::Never && !is_within_a_state {
             return LinearSolverCache { kept, ..LinearSolverCache::with_method(method) };
         }
@@ -325,13 +325,13 @@ impl LocalSystem {
         let (mut least, mut is_slow) = (f64::INFINITY, false);
         // The residual of the recurrence drifts from the true one: restart from the true one where they part.
         while done < most {
-            preconditioner.start(&self.matrix, right_side, x);
+            preconditioner.action.start(&self.matrix, right_side, x);
             let mut start = f64::INFINITY;
             let outcome = cocg::solve(
                 &self.matrix,
                 right_side,
                 x,
-                |r, z| preconditioner.apply(r, z),
+                |r, z| preconditioner.action.apply(r, z),
                 target,
                 most - done,
                 |count, now| {
@@ -414,7 +414,7 @@ impl LocalSystem {
         let Some(factor) = own.filter(|_| self.origin == Origin::Own) else { return false };
         let residual = self.matrix.residual(x, right_side);
         let mut step = vec![c64::default(); x.len()];
-        factor.apply(&residual, &mut step);
+        factor.action.apply(&residual, &mut step);
         let left =
             Left { matrix: &self.matrix, load: right_side, solution: x, residual: &residual, step: &step };
         left.is_rounding(self.goal_now().required)

@@ -206,8 +206,16 @@ impl TwoLevel {
         Ok(Self { analysis: Arc::clone(analysis), smoother, coarse })
     }
 
-    /// Memory of both factors [bytes].
-    pub(super) fn bytes(&self) -> usize {
+    /// `z += P (Pᵀ K P)⁻¹ r` for a coarse right side.
+    fn add_coarse_solution(&self, r: &[c64], z: &mut [c64]) {
+        let mut coarse = vec![c64::default(); r.len()];
+        self.coarse.apply(r, &mut coarse);
+        self.analysis.transfer.add_prolongation(&coarse, z);
+    }
+}
+
+impl Precondition for TwoLevel {
+    fn bytes(&self) -> usize {
         let smoother = match &self.smoother {
             Smoother::Incomplete(factor, restricted) => {
                 factor.bytes() + restricted.values.len() * SINGLE_ENTRY
@@ -218,13 +226,12 @@ impl TwoLevel {
     }
 
     /// Moves `x` so that the residual `b − K x` has no coarse part: where a deflated iteration starts.
-    pub(super) fn start(&self, matrix: &CsrMatrix<c64>, b: &[c64], x: &mut [c64]) {
+    fn start(&self, matrix: &CsrMatrix<c64>, b: &[c64], x: &mut [c64]) {
         let rest = matrix.residual(x, b);
         self.add_coarse_solution(&self.analysis.transfer.restrict(&rest), x);
     }
 
-    /// Overwrites `z` with `M⁻¹ r`.
-    pub(super) fn apply(&self, r: &[c64], z: &mut [c64]) {
+    fn apply(&self, r: &[c64], z: &mut [c64]) {
         let transfer = &self.analysis.transfer;
         let rest = match &self.smoother {
             Smoother::Incomplete(factor, restricted) => {
@@ -238,13 +245,6 @@ impl TwoLevel {
             }
         };
         self.add_coarse_solution(&rest, z);
-    }
-
-    /// `z += P (Pᵀ K P)⁻¹ r` for a coarse right side.
-    fn add_coarse_solution(&self, r: &[c64], z: &mut [c64]) {
-        let mut coarse = vec![c64::default(); r.len()];
-        self.coarse.apply(r, &mut coarse);
-        self.analysis.transfer.add_prolongation(&coarse, z);
     }
 }
 
