@@ -49,7 +49,7 @@ pub struct Accuracy {
     pub error_estimate_relative: Option<f64>,
     /// Estimated errors of the objective at the initial and at the best design, what the true value has more [its unit]; of an
     /// analysis both are the same.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub error_estimate: Option<[f64; 2]>,
     /// Times the mesh was refined to keep a tolerance.
     pub refinements: usize,
@@ -57,23 +57,23 @@ pub struct Accuracy {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub levels: Vec<Level>,
     /// Whether the error bars are within `accuracy.tolerance`; `None` without one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub within_tolerance: Option<bool>,
     /// The curved surface whose facets are farthest off it; `None` where none is curved.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub facets: Option<CurvedFacets>,
     /// What the objective at the initial and at the best design has more, about, by the losses that impedance surfaces leave out at
     /// sharp edges, where they are round and where the field along them changes [its unit]; of an analysis both are the same. `None`
     /// where it has no loss of one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub excess: Option<[f64; 2]>,
     /// What a wall that is near may cut off, in words; `None` where none is.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub near_wall: Option<String>,
     /// The same two shapes by other elements on the same mesh.
     pub cross_check: Option<CrossCheck>,
     /// Whether the gain of a run is the shape's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub verdict: Option<Verdict>,
 }
 
@@ -101,7 +101,6 @@ pub struct CurvedFacets {
     pub at_m: [f64; 3],
     /// What the objective at the initial and at the best design has more, about, where the facets of all curved surfaces lie on
     /// these in the mean [its unit]; of an analysis both are the same. `None` where that is not known.
-    #[serde(default)]
     pub change: Option<[f64; 2]>,
 }
 

@@ -34,12 +34,10 @@ pub struct Manifest {
     /// The configuration.
     pub config: Option<FileHash>,
     /// Folder that paths in the configuration are relative to, absolute.
-    #[serde(default)]
     pub folder: Option<PathBuf>,
     /// Overrides of the command line, as TOML lines.
     pub overrides: Vec<String>,
     /// Limits in force, of the configuration or the command line; `None` where nothing is optimised.
-    #[serde(default)]
     pub limits: Option<LimitsInForce>,
     /// When the run was resumed.
     #[serde(default)]
@@ -57,7 +55,7 @@ pub struct Manifest {
     /// Threads used, of every rank.
     pub threads: usize,
     /// The most ranks that the work was shared out among; absent for one process.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ranks: Option<usize>,
     /// Start, UTC.
     pub started: String,

@@ -36,7 +36,7 @@ pub struct RunResult {
     /// The objective; `None` when the configuration has none.
     pub objective: Option<ObjectiveResult>,
     /// How exact it is; `None` without an objective, and where nothing is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub accuracy: Option<Accuracy>,
     /// The constraints at the best design, in the order of the configuration.
     #[serde(default)]
@@ -59,13 +59,13 @@ pub struct RunResult {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<BodyForce>,
     /// Estimated errors of losses, forces, probes and flux linkages; `None` where there is no estimate.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub errors: Option<StateErrors>,
     /// What the facets of curved surfaces change of the same, about, of an analysis; `None` where none is curved.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub facets_change: Option<StateErrors>,
     /// Newton's method and saturation, where there is a B–H curve.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub saturation: Option<SaturationResult>,
     /// What depends on the frequency and on the load, for each; only where there are several.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -74,7 +74,7 @@ pub struct RunResult {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub initial: Vec<StateResult>,
     /// Open space, where the mesh has a shell that stands for it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub open: Option<OpenResult>,
     /// What the terminals of the coils with `turns` see, at the first frequency.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -138,10 +138,9 @@ pub struct ObjectiveResult {
     /// The evaluation of the best design.
     pub best_evaluation: usize,
     /// `best / initial` of the same two shapes on a freshly generated mesh; `None` where that was not computed.
-    #[serde(default)]
     pub verified_ratio: Option<f64>,
     /// How the verified ratio came about; `None` without one, and where the initial design is the best.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub verification: Option<Verification>,
     /// How homogeneous the field is, where that is a term of the objective; its keys stand beside the others.
     #[serde(flatten)]
@@ -163,7 +162,6 @@ pub struct HomogeneityResult {
     /// Largest less smallest value over the mean, in parts per million; of vectors, of their part along the mean.
     pub peak_to_peak_ppm: f64,
     /// The frequency or load that it is of; `None` where there is one alone.
-    #[serde(default)]
     pub state: Option<String>,
 }
 
@@ -180,7 +178,7 @@ pub struct Verification {
     pub tets: usize,
     /// On a fresh mesh how far the best shape is from that of the run, on cut elements how far its facets are from what the control
     /// grid describes; `None` where nodes are the variables.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation: Option<ShapeDeviation>,
     /// The objective at the initial design there.
     pub initial: f64,
@@ -250,7 +248,7 @@ pub struct TermResult {
     /// Its frequency [Hz]; `null` for the sum over all.
     pub frequency: Option<f64>,
     /// Its load; left out for the sum over all, and where there are none.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub load: Option<String>,
     /// Its factor in the objective.
     pub weight: f64,
@@ -271,7 +269,7 @@ pub struct ConstraintResult {
     pub satisfied: bool,
     /// Estimated error of the value, with sign, less that of a bound which is a share of the initial value, in SI; `None` where there
     /// is no estimate, and for quantities of the shape.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub error_estimate: Option<f64>,
 }
 

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct StateResult {
     /// The load, where there are some.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub load: Option<String>,
     /// The frequency [Hz].
     pub frequency_hz: f64,
@@ -21,7 +21,7 @@ pub struct StateResult {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub forces: Vec<BodyForce>,
     /// Newton's method and saturation, where there is a B–H curve.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub saturation: Option<SaturationResult>,
     /// What the terminals of the coils with `turns` see.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -30,10 +30,10 @@ pub struct StateResult {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub multipoles: Vec<MultipoleResult>,
     /// Estimated errors of these; `None` where there is no estimate.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub errors: Option<StateErrors>,
     /// What the facets of curved surfaces change of these, about; `None` where none is curved.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub facets_change: Option<StateErrors>,
 }
 
@@ -168,7 +168,6 @@ pub struct SaturatedRegion {
     pub table_ends_b_t: Option<f64>,
     /// Where its knee is: the `B` beyond which the differential permeability is below a tenth of its largest [T]; `None` where
     /// there is no such field.
-    #[serde(default)]
     pub knee_b_t: Option<f64>,
     /// Share of its volume beyond the knee: where the differential permeability is below a tenth of its largest.
     pub volume_share_beyond_knee: f64,
