@@ -17,25 +17,16 @@ pub(crate) struct Table<const N: usize> {
 }
 
 impl<const N: usize> Table<N> {
-    /// A table of the columns with these names.
-    pub(crate) fn new(columns: [(&str, Align); N]) -> Self {
-        Self {
-            columns: columns.map(|(_, align)| align),
-            rows: vec![columns.map(|(name, _)| name.to_owned())],
-        }
+    /// A table of the columns with these names, and its rows.
+    pub(crate) fn new(columns: [(&str, Align); N], rows: impl IntoIterator<Item = [String; N]>) -> Self {
+        let header = columns.map(|(name, _)| name.to_owned());
+        Self { columns: columns.map(|(_, align)| align), rows: std::iter::once(header).chain(rows).collect() }
     }
 
     /// A name and numbers in every row.
     pub(crate) fn of_numbers(names: [&str; N], rows: impl IntoIterator<Item = [String; N]>) -> Self {
         let align = |k: usize| if k == 0 { Align::Left } else { Align::Right };
-        let mut table = Self::new(std::array::from_fn(|k| (names[k], align(k))));
-        table.rows.extend(rows);
-        table
-    }
-
-    /// A further row.
-    pub(crate) fn row(&mut self, cells: [String; N]) {
-        self.rows.push(cells);
+        Self::new(std::array::from_fn(|k| (names[k], align(k))), rows)
     }
 
     /// The lines, each with its break, after an empty one; nothing where the table has no row.
@@ -70,11 +61,10 @@ mod tests {
 
     #[test]
     fn columns_are_as_wide_as_their_longest_cell() {
-        let mut table = Table::new([("region", Align::Left), ("tets", Align::Right), ("in", Align::Left)]);
-        assert_eq!(table.text(), "");
-        table.row(["a region with a name as long as this".to_owned(), "7".to_owned(), "µ".to_owned()]);
-        table.row(["b".to_owned(), "12345".to_owned(), String::new()]);
-        let text = table.text();
+        let columns = [("region", Align::Left), ("tets", Align::Right), ("in", Align::Left)];
+        assert_eq!(Table::new(columns, []).text(), "");
+        let rows = [["a region with a name as long as this", "7", "µ"], ["b", "12345", ""]];
+        let text = Table::new(columns, rows.map(|row| row.map(str::to_owned))).text();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[1], format!("{:<36}  {:>5}  in", "region", "tets"));
         assert_eq!(lines[2], "a region with a name as long as this      7  µ");

@@ -267,30 +267,24 @@ fn bound_of(constraint: &Constraint) -> String {
 
 fn region_table(summary: &Summary<'_>) -> Table<5> {
     use Align::{Left, Right};
-    let mut table = Table::new([
-        ("region", Left),
-        ("tets", Right),
-        ("volume cm³", Right),
-        ("material", Left),
-        ("model", Left),
-    ]);
-    for r in &summary.regions {
+    let columns =
+        [("region", Left), ("tets", Right), ("volume cm³", Right), ("material", Left), ("model", Left)];
+    let rows = summary.regions.iter().map(|r| {
         let volume = format_number(r.volume_m3 * 1e6);
-        table.row([r.name.clone(), r.tets.to_string(), volume, r.material.clone(), r.model.to_owned()]);
-    }
-    table
+        [r.name.clone(), r.tets.to_string(), volume, r.material.clone(), r.model.to_owned()]
+    });
+    Table::new(columns, rows)
 }
 
 fn material_table(summary: &Summary<'_>) -> Table<4> {
     use Align::{Left, Right};
     let columns =
         [("material", Left), ("permeability", Left), ("conductivity S/m", Right), ("density kg/m³", Right)];
-    let mut table = Table::new(columns);
-    for (name, material) in summary.materials {
+    let rows = summary.materials.iter().map(|(name, material)| {
         let density = material.density.map_or_else(String::new, |density| density.to_string());
-        table.row([name.clone(), permeability(material), material.conductivity.to_string(), density]);
-    }
-    table
+        [name.clone(), permeability(material), material.conductivity.to_string(), density]
+    });
+    Table::new(columns, rows)
 }
 
 /// The law of a material: its relative permeability, or what its curve is.
@@ -309,12 +303,9 @@ fn permeability(material: &Material) -> String {
 }
 
 fn surface_table(summary: &Summary<'_>) -> Table<3> {
-    let columns = [("surface", Align::Left), ("triangles", Align::Right), ("area cm²", Align::Right)];
-    let mut table = Table::new(columns);
-    for s in &summary.surfaces {
-        table.row([s.name.clone(), s.triangles.to_string(), format_number(s.area_m2 * 1e4)]);
-    }
-    table
+    let surfaces = summary.surfaces.iter();
+    let rows = surfaces.map(|s| [s.name.clone(), s.triangles.to_string(), format_number(s.area_m2 * 1e4)]);
+    Table::of_numbers(["surface", "triangles", "area cm²"], rows)
 }
 
 /// Most sides without condition that are listed: those of a box, and as many again.
@@ -322,24 +313,19 @@ const MOST_SIDES: usize = 12;
 
 fn open_table(summary: &Summary<'_>) -> Table<4> {
     use Align::{Left, Right};
-    let mut table = Table::new([
-        ("no condition, field normal", Left),
-        ("triangles", Right),
-        ("area cm²", Right),
-        ("at mm", Left),
-    ]);
-    for side in summary.open_sides.iter().take(MOST_SIDES) {
+    let columns =
+        [("no condition, field normal", Left), ("triangles", Right), ("area cm²", Right), ("at mm", Left)];
+    let rows = summary.open_sides.iter().take(MOST_SIDES).map(|side| {
         let area = format_number(side.area_m2 * 1e4);
-        table.row([side.region.clone(), side.triangles.to_string(), area, millimetres(side.at_m)]);
-    }
-    table
+        [side.region.clone(), side.triangles.to_string(), area, millimetres(side.at_m)]
+    });
+    Table::new(columns, rows)
 }
 
 fn coil_table(summary: &Summary<'_>) -> Table<4> {
     use Align::{Left, Right};
-    let mut table =
-        Table::new([("coil", Left), ("ampere-turns A", Right), ("phase deg", Right), ("shape", Left)]);
-    for coil in summary.coils {
+    let columns = [("coil", Left), ("ampere-turns A", Right), ("phase deg", Right), ("shape", Left)];
+    let rows = summary.coils.iter().map(|coil| {
         let at = |center: [f64; 3]| format!("centre {} mm", millimetres(center));
         let window = |[a, b]: [f64; 2]| format!("window 2 x {} by 2 x {} mm", millimetre(a), millimetre(b));
         let section =
@@ -364,7 +350,7 @@ fn coil_table(summary: &Summary<'_>) -> Table<4> {
             CoilShape::Region(c) => format!("region {}", c.region),
         };
         let phase = format!("{}", (coil.phase.to_degrees() * 1e6).round() / 1e6 + 0.0);
-        table.row([
+        [
             coil.name.clone(),
             match (coil.ampere_turns, coil.voltage) {
                 (Some(current), _) => current.to_string(),
@@ -372,22 +358,22 @@ fn coil_table(summary: &Summary<'_>) -> Table<4> {
             },
             phase,
             shape,
-        ]);
-    }
-    table
+        ]
+    });
+    Table::new(columns, rows)
 }
 
 fn skin_table(summary: &Summary<'_>) -> Table<5> {
     use Align::{Left, Right};
-    let mut table = Table::new([
+    let columns = [
         ("conductor", Left),
         ("model", Left),
         ("skin depth mm", Right),
         ("elements per depth", Right),
         ("2V/S in depths", Right),
-    ]);
+    ];
     let has_several = summary.skin.iter().any(|s| s.frequency_hz != summary.skin[0].frequency_hz);
-    for s in &summary.skin {
+    let rows = summary.skin.iter().map(|s| {
         let conductor = match has_several {
             true => format!("{} at {} Hz", s.region, Readable(s.frequency_hz)),
             false => s.region.clone(),
@@ -400,26 +386,19 @@ fn skin_table(summary: &Summary<'_>) -> Table<5> {
         let unsaturated = if s.largest_permeability.is_some() { " unsaturated" } else { "" };
         let depth = format!("{:.3}{unsaturated}", Millimetres(s.skin_depth_m));
         let thickness = format!("{:.1}", s.thickness_in_skin_depths);
-        table.row([conductor, s.model.to_owned(), depth, elements, thickness]);
-    }
-    table
+        [conductor, s.model.to_owned(), depth, elements, thickness]
+    });
+    Table::new(columns, rows)
 }
 
 fn motion_table(summary: &Summary<'_>) -> Table<5> {
-    use Align::{Left, Right};
-    let mut table = Table::new([
-        ("motion", Left),
-        ("moved nodes", Right),
-        ("largest mm", Right),
-        ("elements of body", Right),
-        ("equations", Right),
-    ]);
-    for m in &summary.motions {
+    let names = ["motion", "moved nodes", "largest mm", "elements of body", "equations"];
+    let rows = summary.motions.iter().map(|m| {
         let largest = format!("{:.3}", Millimetres(m.largest_displacement_m));
         let [nodes, elements, equations] = [m.moved_nodes, m.elements, m.equations].map(|n| n.to_string());
-        table.row([m.name.clone(), nodes, largest, elements, equations]);
-    }
-    table
+        [m.name.clone(), nodes, largest, elements, equations]
+    });
+    Table::of_numbers(names, rows)
 }
 
 /// A length to a micrometre [mm].
