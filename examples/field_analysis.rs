@@ -36,7 +36,7 @@ pub(crate) fn main() -> Result<(), SolverError> {
     )?;
     let (field, _) = model.solve(&mesh)?;
 
-    let b = recovery::probe(&field, &model, &mesh, "behind the plate", &[[0.0, 0.0, -0.05]])?[0];
+    let b = recovery::probe((&model, &mesh, &field), "behind the plate", &[[0.0, 0.0, -0.05]])?[0];
     println!("{} unknowns, residual {:.1e}", model.unknown_count(), field.report().residual);
     println!("Bz behind the plate: {:.3} {:+.3}j mT", b[2].re * 1e3, b[2].im * 1e3);
     for (region, loss) in field.losses(&model, &mesh) {

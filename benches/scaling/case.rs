@@ -154,7 +154,7 @@ fn step(problem: &Problem, record: &mut Record) {
     let (time, state) = timed(|| model.solve_prepared(&mut system, &load).expect("it converges"));
     record.state = time;
     let functional = &problem.objective().expect("it has an objective").terms[0].functional;
-    let (evaluation, value) = timed(|| functional.evaluate(model, &mesh, &state).expect("it is finite"));
+    let (evaluation, value) = timed(|| functional.evaluate((model, &mesh, &state)).expect("it is finite"));
     let (time, lambda) = timed(|| {
         adjoint::solve_to(&mut system, &value.derivative, SEARCH_ADJOINT_TOLERANCE).expect("it converges")
     });
@@ -163,7 +163,7 @@ fn step(problem: &Problem, record: &mut Record) {
     record.method = model.method_name();
     record.preconditioner_bytes = system.preconditioner_bytes();
     let (nodes, nodal) = timed(|| {
-        adjoint::node_gradient(model, &mesh, &state, &lambda, shape.motion().moving()).expect("it is here")
+        adjoint::node_gradient((model, &mesh, &state), &lambda, shape.motion().moving()).expect("it is here")
     });
     record.gradient = evaluation + nodes;
     let (backward, gradient) =

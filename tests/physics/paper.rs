@@ -52,10 +52,10 @@ fn field_errors(name: &str) -> (f64, [f64; 2], [f64; 2]) {
         let (model, solution) = (&problem.states()[0], &analysis.solutions[0]);
         let objective = problem.objective().expect("an objective");
         cells[case] = relative_l2(
-            &objective.terms[0].functional.cell_flux_densities(model, &analysis.mesh, solution),
+            &objective.terms[0].functional.cell_flux_densities((model, &analysis.mesh, solution)),
             b,
         );
-        let recovered = recovery::probe(solution, model, &analysis.mesh, "cells", &reference.points)
+        let recovered = recovery::probe((model, &analysis.mesh, solution), "cells", &reference.points)
             .unwrap_or_else(|e| panic!("{e}"));
         probes[case] = relative_l2(&recovered, b);
         let value = analysis.objective.expect("an objective");

@@ -10,7 +10,7 @@ use fluxmorph_optimizer::body::Body;
 use fluxmorph_optimizer::constraint::Quantity;
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
-use fluxmorph_solver::{FieldModel, FieldSolution};
+use fluxmorph_solver::{FieldModel, FieldSolution, FieldState};
 use rayon::prelude::*;
 
 /// What the arrays of a design are made from; a rank has no more of it.
@@ -74,7 +74,7 @@ pub fn deviation(problem: &Problem, analysis: &Analysis) -> Option<Vec<f64>> {
     for term in functionals(problem) {
         let Some(&state) = term.states.first() else { continue };
         let (model, solution) = (&problem.states()[state], &analysis.solutions[state]);
-        for (e, own) in term.functional.deviations(model, &analysis.mesh, solution) {
+        for (e, own) in term.functional.deviations((model, &analysis.mesh, solution)) {
             all[e.index()].get_or_insert(own);
         }
     }
@@ -143,7 +143,7 @@ impl Arrays {
                     drawn.push(body);
                 }
             }
-            let of = |body: &Body| body.nodal(&states[0], data.mesh, &data.solutions[0]);
+            let of = |body: &Body| body.nodal((&states[0], data.mesh, &data.solutions[0]));
             for (node, own) in drawn.into_iter().flat_map(of) {
                 (0..3).for_each(|d| force[node.index()][d] += own[d]);
             }
@@ -154,7 +154,7 @@ impl Arrays {
             force,
             states: states
                 .map(|(index, (model, solution))| {
-                    StateArrays::new(model, solution, data.mesh, index, nodes, elements)
+                    StateArrays::new((model, data.mesh, solution), index, nodes, elements)
                 })
                 .collect(),
             displacement: at(data.displacement),
@@ -212,9 +212,7 @@ struct StateArrays {
 
 impl StateArrays {
     fn new(
-        model: &FieldModel,
-        solution: &FieldSolution,
-        mesh: &Mesh,
+        (model, mesh, solution): FieldState<'_>,
         index: usize,
         nodes: &[NodeId],
         elements: &[ElementId],

@@ -5,14 +5,14 @@
 
 use std::collections::BTreeMap;
 
+use fluxmorph_geometry::Readable;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::{Mesh, Readable};
 use fluxmorph_optimizer::constraint::{Bound, Quantity};
 use fluxmorph_optimizer::objective::Term;
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::audit::{ExcessLoss, excess_losses};
 use fluxmorph_solver::circuit::{currents, powers};
-use fluxmorph_solver::{Boundary, FieldModel, FieldSolution};
+use fluxmorph_solver::{Boundary, FieldModel, FieldSolution, FieldState};
 
 use super::Session;
 use super::reported::under;
@@ -25,7 +25,7 @@ use crate::show::Observer;
 pub(super) fn of_conductors(config: &Config, problem: &Problem, analysis: &Analysis) -> Vec<String> {
     let mut worst: BTreeMap<String, (ExcessLoss, &FieldModel)> = BTreeMap::new();
     for (model, solution) in problem.states().iter().zip(&analysis.solutions) {
-        for found in excess_losses(model, &analysis.mesh, solution) {
+        for found in excess_losses((model, &analysis.mesh, solution)) {
             let largest = worst.get(&found.region).map_or(LEAST_LEFT_OUT, |(own, _)| own.share().abs());
             if found.share().abs() > largest {
                 worst.insert(found.region.clone(), (found, model));
@@ -104,10 +104,10 @@ impl OneCoil {
     }
 
     /// That of a state; `None` where something else excites the field, too.
-    fn of(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Option<Self> {
+    fn of((model, mesh, solution): FieldState<'_>) -> Option<Self> {
         let setup = model.setup();
         let is_applied = |boundary: &Boundary| matches!(boundary, Boundary::UniformField(_));
-        let (currents, powers) = (currents(model, solution), powers(model, mesh, solution));
+        let (currents, powers) = (currents(model, solution), powers((model, mesh, solution)));
         let ([winding], [(_, current)], [(_, power)]) = (&setup.windings[..], &currents[..], &powers[..])
         else {
             return None;
@@ -149,9 +149,9 @@ impl LeftOut {
     /// That of an analysis.
     pub(super) fn of(problem: &Problem, analysis: &Analysis) -> Self {
         let of_state = |(model, solution): (&FieldModel, &FieldSolution)| {
-            let found = excess_losses(model, &analysis.mesh, solution).into_iter();
+            let found = excess_losses((model, &analysis.mesh, solution)).into_iter();
             let losses = found.map(|own| (own.region.clone(), [own.of_surface, own.more()])).collect();
-            OfState { losses, coil: OneCoil::of(model, &analysis.mesh, solution) }
+            OfState { losses, coil: OneCoil::of((model, &analysis.mesh, solution)) }
         };
         Self(problem.states().iter().zip(&analysis.solutions).map(of_state).collect())
     }

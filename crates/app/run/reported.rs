@@ -5,7 +5,6 @@
 
 use std::collections::BTreeMap;
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::locate::{Located, locate};
 use fluxmorph_geometry::tet4::{Point, norm, sub};
@@ -14,7 +13,7 @@ use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::circuit::{currents, direct_resistances, flux_linkages};
 use fluxmorph_solver::element::amplitude;
 use fluxmorph_solver::multipole::Harmonic;
-use fluxmorph_solver::{FieldModel, FieldSolution, recovery};
+use fluxmorph_solver::{FieldModel, FieldState, recovery};
 
 use crate::build::multipole;
 use crate::config::{Config, MultipoleSet, Probe};
@@ -59,9 +58,6 @@ pub(super) struct Reported {
     probes: Vec<(String, AtPoints)>,
 }
 
-/// A field with its model and its mesh.
-type Field<'a> = (&'a FieldModel, &'a Mesh, &'a FieldSolution);
-
 /// B at the points of a probe [T]; `None` outside the mesh.
 pub(super) type AtPoints = Vec<Option<[c64; 3]>>;
 
@@ -72,13 +68,13 @@ pub(super) type Terms = Vec<(Harmonic, c64)>;
 pub(super) fn probes(
     config: &Config,
     located: &[Option<Located>],
-    (model, mesh, solution): Field<'_>,
+    state: FieldState<'_>,
 ) -> Vec<(String, AtPoints)> {
     let mut located = located.iter();
     let mut of_probe = |probe: &Probe| {
         let at = |(place, located): (&Point, &Option<Located>)| {
             let (e, _) = (*located)?;
-            Some(recovery::recovered_flux_density(solution, model, mesh, e, *place))
+            Some(recovery::recovered_flux_density(state, e, *place))
         };
         (probe.name.clone(), probe.points.iter().zip(located.by_ref()).map(at).collect())
     };
@@ -88,11 +84,11 @@ pub(super) fn probes(
 /// The terms of every expansion.
 pub(super) fn expansions(
     config: &Config,
-    (model, mesh, solution): Field<'_>,
+    (model, mesh, solution): FieldState<'_>,
 ) -> Result<Vec<(String, Terms)>, Error> {
     let of = |set: &MultipoleSet| {
         let multipoles = multipole::multipoles(config, set, mesh, model)?;
-        Ok((set.name.clone(), multipoles.coefficients(model, mesh, solution)?))
+        Ok((set.name.clone(), multipoles.coefficients((model, mesh, solution))?))
     };
     config.multipoles.iter().map(of).collect()
 }
@@ -116,7 +112,7 @@ impl Reported {
     /// That of a field; `None` where an expansion cannot be had of it.
     pub(super) fn of(
         (config, bodies): (&Config, &[Body]),
-        (model, mesh, solution): Field<'_>,
+        (model, mesh, solution): FieldState<'_>,
     ) -> Option<Self> {
         let points = config.probes.iter().flat_map(|probe| &probe.points).copied().collect::<Vec<Point>>();
         let expansions = expansions(config, (model, mesh, solution)).ok()?;
@@ -124,8 +120,8 @@ impl Reported {
             losses: solution.losses(model, mesh),
             currents: currents(model, solution),
             resistances: direct_resistances(model),
-            flux_linkages: flux_linkages(model, mesh, solution),
-            forces: bodies.iter().map(|body| body.force(model, mesh, solution)).collect(),
+            flux_linkages: flux_linkages((model, mesh, solution)),
+            forces: bodies.iter().map(|body| body.force((model, mesh, solution))).collect(),
             expansions,
             probes: probes(config, &locate(mesh, &points), (model, mesh, solution)),
         })

@@ -6,12 +6,12 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, norm, volume};
-use fluxmorph_geometry::{ElementId, Mesh, Readable, millimetres};
+use fluxmorph_geometry::{ElementId, Readable, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::audit::weighted_median;
 use fluxmorph_solver::bh::peak;
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
-use fluxmorph_solver::{FieldModel, FieldSolution, SurfaceLaw};
+use fluxmorph_solver::{FieldModel, FieldSolution, FieldState, SurfaceLaw};
 
 use super::reported::under;
 use super::{excess, transmission};
@@ -124,7 +124,7 @@ fn skins_of_curves(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<A
         let is_supposed = |own: &&Audited| {
             own.permeability_of == PermeabilityOf::LargestOfCurve && own.frequency == model.setup().frequency
         };
-        let permeability = |layer: &[(ElementId, f64)]| median_permeability(model, solution, mesh, layer);
+        let permeability = |layer: &[(ElementId, f64)]| median_permeability((model, mesh, solution), layer);
         let supposed = setup.audits.iter().filter(is_supposed);
         supposed.filter_map(|own| audit_in_field((config, mesh), own, permeability)).collect::<Vec<_>>()
     };
@@ -132,12 +132,7 @@ fn skins_of_curves(config: &Config, setup: &Setup, analysis: &Analysis) -> Vec<A
 }
 
 /// The median of the relative permeability in elements with a B–H curve, by what they weigh.
-fn median_permeability(
-    model: &FieldModel,
-    solution: &FieldSolution,
-    mesh: &Mesh,
-    weighed: &[(ElementId, f64)],
-) -> Option<f64> {
+fn median_permeability((model, mesh, solution): FieldState<'_>, weighed: &[(ElementId, f64)]) -> Option<f64> {
     let curve = model.curve_of(weighed.first()?.0)?;
     let permeability = |b: f64| match curve.at(b).field_strength {
         h if h > 0.0 => b / (VACUUM_PERMEABILITY * h),

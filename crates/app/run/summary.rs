@@ -109,7 +109,7 @@ impl Session<'_> {
     ) -> Result<(), Error> {
         let problem = &self.setup.problem;
         let (model, solution) = (&problem.states()[index], &analysis.solutions[index]);
-        let force = |body: &Body| body.force(model, &analysis.mesh, solution);
+        let force = |body: &Body| body.force((model, &analysis.mesh, solution));
         state.forces = problem.bodies().iter().map(force).collect();
         state.saturation = saturation(model, analysis, solution);
         state.coils = coils(terminals, model.angular_frequency());
@@ -244,7 +244,7 @@ fn saturation(model: &FieldModel, analysis: &Analysis, solution: &FieldSolution)
     };
     (!model.is_linear()).then(|| SaturationResult {
         newton_steps: solution.newton_steps(),
-        regions: saturation::by_region(model, &analysis.mesh, solution).into_iter().map(of).collect(),
+        regions: saturation::by_region((model, &analysis.mesh, solution)).into_iter().map(of).collect(),
     })
 }
 
@@ -259,7 +259,7 @@ fn all_terminals(problem: &Problem, analysis: &Analysis) -> Result<Vec<Terminals
             Some(k) => state = state.with_responses_of(&responded[k]),
             None => model.respond_to_all(mesh, method, &mut state)?,
         }
-        all.push(circuit::terminals(model, mesh, &state)?);
+        all.push(circuit::terminals((model, mesh, &state))?);
         responded.push(state);
     }
     Ok(all)
@@ -297,7 +297,7 @@ fn open(problem: &Problem, analysis: &Analysis) -> Result<Option<OpenResult>, Er
     let share = |(model, solution): (&FieldModel, &FieldSolution)| -> Result<Option<f64>, Error> {
         let Some(open) = model.setup().open else { return Ok(None) };
         let of = |region| -> Result<f64, SolverError> {
-            Ok(Functional::energy(model, region)?.evaluate(model, &analysis.mesh, solution)?.value)
+            Ok(Functional::energy(model, region)?.evaluate((model, &analysis.mesh, solution))?.value)
         };
         let (shell, all) = (of(Some(open.region))?, of(None)?);
         Ok(Some(if all > 0.0 { shell / all } else { 0.0 }))
@@ -341,7 +341,7 @@ pub(super) fn homogeneity(problem: &Problem, analysis: &Analysis, initial: f64) 
     let qualities = terms.iter().filter_map(|term| {
         let index = *term.states.first()?;
         let (model, solution) = (&problem.states()[index], &analysis.solutions[index]);
-        let quality = term.functional.field_quality(model, &analysis.mesh, solution)?;
+        let quality = term.functional.field_quality((model, &analysis.mesh, solution))?;
         Some((objective.goal.sign() * term.weight * quality.rms * quality.rms, quality, model))
     });
     let worse = |a: &f64, b: &f64| objective.combination == Combination::WorstCase && b > a;

@@ -3,11 +3,11 @@
 
 use fluxmorph_geometry::locate::locate;
 use fluxmorph_geometry::tet4::{Point, centroid};
-use fluxmorph_geometry::{Mesh, Readable, millimetres};
+use fluxmorph_geometry::{Readable, millimetres};
 use fluxmorph_optimizer::problem::{Analysis, Problem};
 use fluxmorph_solver::audit::{Transmission, transmissions};
 use fluxmorph_solver::element::amplitude;
-use fluxmorph_solver::{FieldModel, FieldSolution};
+use fluxmorph_solver::{FieldModel, FieldState};
 
 use super::reported::{probes, under};
 use crate::build::observed_regions;
@@ -38,7 +38,7 @@ pub(super) fn warnings(config: &Config, problem: &Problem, analysis: &Analysis) 
         }
         let observed = observed(config, (model, &analysis.mesh, solution));
         let places: Vec<Point> = observed.iter().flat_map(|own| own.places.iter().copied()).collect();
-        for found in transmissions(model, &analysis.mesh, solution, &places) {
+        for found in transmissions((model, &analysis.mesh, solution), &places) {
             let mut passing = &found.flux_densities[..];
             for own in &observed {
                 let (here, rest) = passing.split_at(own.places.len());
@@ -74,7 +74,7 @@ fn text(own: &Observed, (found, model): (&Transmission, &FieldModel), [b, passin
 }
 
 /// The points of probes, and every region whose field is part of the objective or of a constraint.
-fn observed(config: &Config, (model, mesh, solution): (&FieldModel, &Mesh, &FieldSolution)) -> Vec<Observed> {
+fn observed(config: &Config, (model, mesh, solution): FieldState<'_>) -> Vec<Observed> {
     let points: Vec<Point> = config.probes.iter().flat_map(|probe| probe.points.iter().copied()).collect();
     let located = locate(mesh, &points);
     let mut all = Vec::new();

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use fluxmorph_geometry::tet4::Point;
 use fluxmorph_geometry::{Mesh, NodeId, RegionId};
 use fluxmorph_solver::functional::{Force, resultant};
-use fluxmorph_solver::{FieldModel, FieldSolution, RigidMotion, SolverError};
+use fluxmorph_solver::{FieldModel, FieldState, RigidMotion, SolverError};
 use serde::{Deserialize, Serialize};
 
 /// A body with the layer of elements in which its force is taken.
@@ -56,13 +56,8 @@ impl Body {
     }
 
     /// What acts on its nodes [N].
-    pub fn nodal(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> BTreeMap<NodeId, Point> {
-        self.force.nodal(model, mesh, solution)
+    pub fn nodal(&self, state: FieldState<'_>) -> BTreeMap<NodeId, Point> {
+        self.force.nodal(state)
     }
 
     /// No force, under its name.
@@ -71,8 +66,8 @@ impl Body {
     }
 
     /// Its force and torque.
-    pub fn force(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> BodyForce {
-        let [force_n, torque_nm] = resultant(&self.nodal(model, mesh, solution), mesh, self.about);
+    pub fn force(&self, (model, mesh, solution): FieldState<'_>) -> BodyForce {
+        let [force_n, torque_nm] = resultant(&self.nodal((model, mesh, solution)), mesh, self.about);
         BodyForce { name: self.name.clone(), state: None, force_n, torque_nm }
     }
 }

@@ -160,7 +160,7 @@ fn loops(criterion: &mut Criterion<CpuTime>, order: Order, refinement: f64) {
     group.bench_function("load", |b| b.iter(|| model.load(&mesh)));
     let (state, system) = model.solve(&mesh).expect("a regular system");
     group.bench_function("gradient at nodes", |b| {
-        b.iter(|| adjoint::node_gradient(&model, &mesh, &state, &state, &elements));
+        b.iter(|| adjoint::node_gradient((&model, &mesh, &state), &state, &elements));
     });
     group.bench_function("flux densities", |b| b.iter(|| state.flux_densities(&model, &mesh)));
     group.bench_function("current densities", |b| {
@@ -168,7 +168,7 @@ fn loops(criterion: &mut Criterion<CpuTime>, order: Order, refinement: f64) {
     });
     group.bench_function("losses", |b| b.iter(|| state.losses(&model, &mesh)));
     let energy = Functional::energy(&model, None).expect("the mesh is not empty");
-    group.bench_function("energy functional", |b| b.iter(|| energy.evaluate(&model, &mesh, &state)));
+    group.bench_function("energy functional", |b| b.iter(|| energy.evaluate((&model, &mesh, &state))));
     let matrix = system.matrix().expect("one process has the matrix");
     let mut image = vec![c64::default(); matrix.structure.row_count()];
     group.throughput(Throughput::Elements(matrix.values.len() as u64));

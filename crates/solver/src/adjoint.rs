@@ -12,15 +12,14 @@ use std::collections::BTreeMap;
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{ElementId, Mesh, NodeId, Topology};
+use fluxmorph_geometry::{ElementId, NodeId, Topology};
 use rayon::prelude::*;
 
 use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::linear::{LinearSolverReport, PreparedSystem};
-use crate::model::FieldModel;
 use crate::nonlinear;
-use crate::solution::FieldSolution;
+use crate::solution::{FieldSolution, FieldState};
 use crate::surface::SurfaceTerm;
 
 /// Solves the adjoint problem with the state's prepared system for `∂F/∂u` ([`crate::functional`]).
@@ -53,9 +52,7 @@ pub fn solve_to(
 /// # Errors
 /// [`SolverError::Rank`] where the problem is distributed.
 pub fn node_gradient(
-    model: &FieldModel,
-    mesh: &Mesh,
-    state: &FieldSolution,
+    (model, mesh, state): FieldState<'_>,
     adjoint: &FieldSolution,
     moving: &[ElementId],
 ) -> Result<Vec<Point>, SolverError> {
@@ -63,7 +60,7 @@ pub fn node_gradient(
         Some(distributed) => {
             distributed.node_gradient(state.is_state(), [state.values(), adjoint.values()], moving)
         }
-        None => Ok(gradient_of(model, mesh, state, adjoint, &Extent { moving, triangles: None })),
+        None => Ok(gradient_of((model, mesh, state), adjoint, &Extent { moving, triangles: None })),
     }
 }
 
@@ -76,9 +73,7 @@ pub fn node_gradient(
 /// # Panics
 /// Where the state lacks a response, which the functional's value needs too.
 pub fn inductance_gradient(
-    model: &FieldModel,
-    mesh: &Mesh,
-    state: &FieldSolution,
+    (model, mesh, state): FieldState<'_>,
     derivatives: &[(usize, usize, c64)],
     moving: &[ElementId],
 ) -> Result<Vec<Point>, SolverError> {
@@ -92,7 +87,7 @@ pub fn inductance_gradient(
     let mut gradient = vec![[0.0; 3]; mesh.points().len()];
     for (k, sum) in by_second {
         let weighted = FieldSolution::adjoint(sum, response(k).report());
-        let own = node_gradient(model, mesh, response(k), &weighted, moving)?;
+        let own = node_gradient((model, mesh, response(k)), &weighted, moving)?;
         gradient.iter_mut().zip(own).for_each(|(sum, own)| (0..3).for_each(|d| sum[d] += own[d]));
     }
     Ok(gradient)
@@ -108,9 +103,7 @@ pub(crate) struct Extent<'a> {
 
 /// The contribution of some elements and triangles to [`node_gradient`], shape `(n_nodes, 3)`.
 pub(crate) fn gradient_of(
-    model: &FieldModel,
-    mesh: &Mesh,
-    state: &FieldSolution,
+    (model, mesh, state): FieldState<'_>,
     adjoint: &FieldSolution,
     &Extent { moving, triangles }: &Extent<'_>,
 ) -> Vec<Point> {

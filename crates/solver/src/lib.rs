@@ -62,6 +62,6 @@ pub use material::Material;
 pub use model::FieldModel;
 pub use open::OpenRegion;
 pub use setup::FieldModelSetup;
-pub use solution::FieldSolution;
+pub use solution::{FieldSolution, FieldState};
 pub use space::Space;
 pub use surface::{Conductor, SurfaceLaw};

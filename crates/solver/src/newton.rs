@@ -103,7 +103,7 @@ impl<'a> Energy<'a> {
         self.matrix.mul(&values, &mut residual);
         let (quadratic, work) = (0.5 * dot(&values, &residual).re, dot(&values, &self.load).re);
         let solution = FieldSolution::of_state(values);
-        let added = nonlinear::added(self.model, self.mesh, &solution);
+        let added = nonlinear::added((self.model, self.mesh, &solution));
         axpy(c64::from(-1.0), &self.load, &mut residual);
         axpy(c64::from(1.0), &added.residual, &mut residual);
         Iterate {

@@ -7,8 +7,8 @@
 //! the centroid for elements of first order, on which `B` is constant, four points for those of second order. Energy,
 //! residual, tangent and shape derivative are derivatives of one another to the last digit on any mesh.
 
+use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::fem::c64;
-use fluxmorph_geometry::{ElementId, Mesh};
 use rayon::prelude::*;
 
 use crate::bh::{BhCurve, Tangent};
@@ -16,8 +16,7 @@ use crate::element::Complex3;
 use crate::element::density::OfFlux;
 use crate::element::tensor::MOST_POINTS;
 use crate::family::LocalIntegral;
-use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 use crate::tangents::Tangents;
 
 /// Elements whose integrals are held at once: some megabytes.
@@ -33,12 +32,12 @@ pub(crate) struct Added {
 }
 
 /// Evaluates the laws of a model in a state.
-pub(crate) fn added(model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> Added {
+pub(crate) fn added((model, mesh, state): FieldState<'_>) -> Added {
     let elements = model.elements_with_a_law();
     let mut residual = vec![c64::default(); model.unknown_count()];
     let (mut energy, mut tensors) = (0.0, Vec::with_capacity(elements.len()));
     for chunk in elements.chunks(CHUNK) {
-        let of_chunk: Vec<_> = chunk.par_iter().map(|&e| of_element(model, mesh, state, e)).collect();
+        let of_chunk: Vec<_> = chunk.par_iter().map(|&e| of_element((model, mesh, state), e)).collect();
         // In the order of the elements, whatever the number of threads.
         for (&e, (integral, own)) in chunk.iter().zip(of_chunk) {
             energy += integral.value;
@@ -53,9 +52,7 @@ pub(crate) fn added(model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> A
 
 /// Energy with its derivatives, and tensors, of one element.
 fn of_element(
-    model: &FieldModel,
-    mesh: &Mesh,
-    state: &FieldSolution,
+    (model, mesh, state): FieldState<'_>,
     e: ElementId,
 ) -> (LocalIntegral<4>, [Tangent; MOST_POINTS]) {
     let curve = model.curve_of(e).expect("an element with a law");

@@ -1,11 +1,11 @@
 //! How far every region with a B–H curve goes into it.
 
+use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::tet4::{Point, centroid, volume};
-use fluxmorph_geometry::{ElementId, Mesh};
 
 use crate::bh::{BhCurve, peak};
 use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 
 /// The saturation of a region.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Saturation {
 }
 
 /// Every region with a B–H curve, in the order of the regions.
-pub fn by_region(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<Saturation> {
+pub fn by_region((model, mesh, solution): FieldState<'_>) -> Vec<Saturation> {
     let topology = model.topology();
     let elements = model.elements_with_a_law();
     let mut found: Vec<Option<(Saturation, [f64; 2])>> = vec![None; topology.region_names().len()];

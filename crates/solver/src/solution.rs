@@ -25,6 +25,9 @@ enum Role {
     Adjoint,
 }
 
+/// A state with its model and the mesh on which it was computed.
+pub type FieldState<'a> = (&'a FieldModel, &'a Mesh, &'a FieldSolution);
+
 /// Potentials of one state or adjoint, and how the solver reached them.
 #[derive(Clone, Debug)]
 pub struct FieldSolution {

@@ -151,7 +151,7 @@ fn inductances_of_a_solenoid_and_of_racetracks_are_those_of_their_filaments() {
     let matrix = |coils: Vec<(Racetrack, f64, f64)>| {
         let (mesh, model) = in_open_space(coils, 8);
         let (solution, _) = model.solve(&mesh).expect("it is solved");
-        terminals(&model, &mesh, &solution).expect("they are solved for").inductance
+        terminals((&model, &mesh, &solution)).expect("they are solved for").inductance
     };
     let check = |what: &str, found: f64, exact: f64| {
         println!("{what}: {found:e} H, filaments {exact:e} H, {:+.2} %", 100.0 * (found / exact - 1.0));
@@ -184,7 +184,7 @@ fn inductances_of_coaxial_coils_are_those_of_their_filaments() {
     let (radii, side, d) = ([0.045, 0.035], 0.014, 0.04);
     let (mesh, model) = two_coils(radii, side, d, 8);
     let (solution, _) = model.solve(&mesh).expect("it is solved");
-    let seen = terminals(&model, &mesh, &solution).expect("they are solved for");
+    let seen = terminals((&model, &mesh, &solution)).expect("they are solved for");
     let matrix = &seen.inductance;
     let turns = [10.0, 4.0];
     // A quarter is meshed.
@@ -198,7 +198,7 @@ fn inductances_of_coaxial_coils_are_those_of_their_filaments() {
     let pairs = [(0, 0), (0, 1), (1, 0), (1, 1)];
     let energy: f64 = pairs.iter().map(|&(j, k)| 0.5 * currents[j] * matrix[j][k] * currents[k]).sum();
     let field = Functional::energy(&model, None).expect("an energy");
-    let field = field.evaluate(&model, &mesh, &solution).expect("finite").value;
+    let field = field.evaluate((&model, &mesh, &solution)).expect("finite").value;
     assert!((energy / field - 1.0).abs() < 1e-8, "{energy} {field}");
     let linkage = matrix[0][0] * currents[0] + matrix[0][1] * currents[1];
     assert!((seen.coils[0].flux_linkage.re / linkage - 1.0).abs() < 1e-9);
@@ -233,7 +233,7 @@ fn spherical_harmonics_between_two_coils_are_those_of_their_filaments() {
         let cells = (0..parts as usize).flat_map(|i| (0..parts as usize).map(move |j| (i, j)));
         cells.map(|(i, j)| series(n, a + place(i), h + place(j))).sum::<f64>() / f64::from(parts * parts)
     };
-    let found = multipoles.coefficients(&model, &mesh, &solution).expect("nothing moves");
+    let found = multipoles.coefficients((&model, &mesh, &solution)).expect("nothing moves");
     let main = found[0].1.re;
     for (term, value) in found {
         let exact = match term {
@@ -264,13 +264,13 @@ fn a_voltage_drives_the_current_that_needs_it() {
     let winding = Winding { turns: 50.0, resistance: 0.02, ..NO_CIRCUIT };
     let given = wound_over_a_plate(&mesh, winding, 1000.0);
     let (state, _) = given.solve(&mesh).expect("it is solved");
-    let by_current = terminals(&given, &mesh, &state).expect("solved").coils[0].clone();
+    let by_current = terminals((&given, &mesh, &state)).expect("solved").coils[0].clone();
     let series = Winding { series_inductance: 3e-5, series_capacitance: Some(0.1), ..winding };
     let omega = given.angular_frequency();
     let source = by_current.voltage + (series.impedance(omega) - winding.resistance) * by_current.current;
     let driven = wound_over_a_plate(&mesh, Winding { voltage: Some(source), ..series }, 0.0);
     let (by_voltage_state, _) = driven.solve(&mesh).expect("it is solved");
-    let by_voltage = terminals(&driven, &mesh, &by_voltage_state).expect("solved").coils[0].clone();
+    let by_voltage = terminals((&driven, &mesh, &by_voltage_state)).expect("solved").coils[0].clone();
     for (a, b) in [
         (by_current.current, by_voltage.current),
         (by_current.flux_linkage, by_voltage.flux_linkage),
@@ -329,13 +329,13 @@ fn the_gradient_at_a_fixed_voltage_matches_central_differences() {
         let moved: Vec<Point> = direction.iter().map(|v| v.map(|c| step * c)).collect();
         let mesh = mesh.moved(&moved).expect("small");
         let (state, system) = model.solve(&mesh).expect("it is solved");
-        let value = loss.evaluate(&model, &mesh, &state).expect("finite");
+        let value = loss.evaluate((&model, &mesh, &state)).expect("finite");
         (mesh, state, system, value)
     };
     let (mesh_0, state, mut system, value) = at(0.0);
     let adjoint_state = adjoint::solve(&mut system, &value.derivative).expect("it is solved");
     let field =
-        adjoint::node_gradient(&model, &mesh_0, &state, &adjoint_state, &moving).expect("in one process");
+        adjoint::node_gradient((&model, &mesh_0, &state), &adjoint_state, &moving).expect("in one process");
     let explicit = value.explicit.expect("the plate moves");
     let exact: f64 = (0..direction.len())
         .map(|n| (0..3).map(|d| (field[n][d] + explicit[n][d]) * direction[n][d]).sum::<f64>())

@@ -16,11 +16,11 @@ use crate::{in_the_square, solved, square};
 /// The value of a functional, its estimated error, and what all elements add to that.
 fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f64; 3] {
     let (coarse, state) = solved(mesh, setup.clone());
-    let value = functional.evaluate(&coarse, mesh, &state).expect("a number").value;
+    let value = functional.evaluate((&coarse, mesh, &state)).expect("a number").value;
     let fine = coarse.enriched(mesh, Effort::Any).expect("a sound problem");
     let mut enriched = Enrichment::new(&coarse, fine, (mesh, &state), None).expect("it converges");
     let at = |enriched: &Enrichment, share: f64| {
-        functional.evaluate(enriched.model(), mesh, &enriched.state(share)).expect("a number")
+        functional.evaluate((enriched.model(), mesh, &enriched.state(share))).expect("a number")
     };
     let [before, half_way, after] = [0.0, 0.5, 1.0].map(|share| at(&enriched, share));
     // The same function of the same field: quadrature and rounding alone.
@@ -33,7 +33,7 @@ fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f
 
 fn value(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> f64 {
     let (model, state) = solved(mesh, setup.clone());
-    functional.evaluate(&model, mesh, &state).expect("a number").value
+    functional.evaluate((&model, mesh, &state)).expect("a number").value
 }
 
 /// Effectivity between one half and two, and what elements add makes up the whole.

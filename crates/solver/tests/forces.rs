@@ -62,7 +62,7 @@ fn a_force_beside_oblique_planes_is_that_beside_upright_ones() {
         for motion in motions.clone() {
             let value = |mesh: &Mesh, (model, solution): &(_, _), motion| {
                 let force = Functional::force(model, mesh, "body", &[RegionId(1)], motion).expect("free air");
-                force.evaluate(model, mesh, solution).expect("finite")
+                force.evaluate((model, mesh, solution)).expect("finite")
             };
             let (a, b) = (value(&upright, &before, motion), value(&oblique, &after, turned_motion(motion)));
             let largest = a.explicit.iter().flatten().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));

@@ -94,7 +94,7 @@ fn replaced(mesh: &Mesh, material: Material, setup: impl FnOnce(&Mesh) -> FieldM
     let law = SurfaceLaw::Impedance(material);
     let conductors = vec![Conductor { name: "bar".to_owned(), surface, law }];
     let (model, solution) = solved(&mesh, FieldModelSetup { conductors, ..setup(&mesh) });
-    let mut found = excess_losses(&model, &mesh, &solution);
+    let mut found = excess_losses((&model, &mesh, &solution));
     assert_eq!(found.len(), 1);
     found.remove(0)
 }

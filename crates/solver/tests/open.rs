@@ -54,13 +54,13 @@ fn energy(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution, regions: &[
     let of = |name: &&str| {
         let region = mesh.topology().region(name).expect("a region");
         let functional = Functional::energy(model, Some(region)).expect("an energy");
-        functional.evaluate(model, mesh, solution).expect("finite").value
+        functional.evaluate((model, mesh, solution)).expect("finite").value
     };
     regions.iter().map(of).sum()
 }
 
 fn b_z(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution, point: Point) -> f64 {
-    probe(solution, model, mesh, "probe", &[point]).expect("inside the mesh")[0][2].re
+    probe((model, mesh, solution), "probe", &[point]).expect("inside the mesh")[0][2].re
 }
 
 /// Deviations of the energies outside and inside a sphere of uniform remanence.

@@ -125,7 +125,7 @@ fn the_weak_field_beside_iron_needs_quadratic_or_edge_elements() {
         let materials = vec![Material::AIR, iron, Material::AIR];
         let setup = FieldModelSetup { penalty, materials, ..in_the_square((family, order), 0.0) };
         let (model, solution) = solved(&mesh, setup);
-        let b = probe(&solution, &model, &mesh, "far", &far).expect("points of the mesh");
+        let b = probe((&model, &mesh, &solution), "far", &far).expect("points of the mesh");
         let error = b.iter().map(|b| (b[2] / exact - 1.0).norm()).fold(0.0, f64::max);
         println!("{family:?}, {order:?}, penalty {penalty}: {error:.2e}");
         assert!(error < tolerance, "{family:?}, {order:?}, penalty {penalty}: {error:.2e}");

@@ -42,7 +42,7 @@ fn setup((family, order): (ElementFamily, Order), parallel: &[&str], applied: &[
 
 fn recovered(mesh: &Mesh, setup: FieldModelSetup, points: &[Point]) -> Vec<Complex3> {
     let (model, solution) = solved(mesh, setup);
-    probe(&solution, &model, mesh, "points", points).expect("points of the mesh")
+    probe((&model, mesh, &solution), "points", points).expect("points of the mesh")
 }
 
 const HALF: [&str; 3] = ["x_max", "y_min", "y_max"];
@@ -145,8 +145,8 @@ fn half_of_a_device_has_the_homogeneity_of_the_whole() {
                     let observed = Observed::Homogeneity { of, weighting };
                     let block = Functional::observation(mesh, RegionId(1), observed, Follow::Held);
                     let block = block.expect("a region with elements");
-                    let value = block.evaluate(&model, mesh, &solution).expect("finite").value;
-                    let quality = block.field_quality(&model, mesh, &solution).expect("its figures");
+                    let value = block.evaluate((&model, mesh, &solution)).expect("finite").value;
+                    let quality = block.field_quality((&model, mesh, &solution)).expect("its figures");
                     [value, quality.mean, quality.peak_to_peak]
                 };
                 let part = figures(&half, &["x_min"], &HALF);

@@ -189,7 +189,7 @@ fn derivatives_match(frequency: f64, iron_material: Material, families: &[(Eleme
         let values = |s: f64| {
             let mesh = moved(&start, s);
             let (state, _) = model.solve(&mesh).expect("it converges");
-            let value = |f: &Functional| f.evaluate(&model, &mesh, &state).expect("finite").value;
+            let value = |f: &Functional| f.evaluate((&model, &mesh, &state)).expect("finite").value;
             functionals.iter().map(value).collect::<Vec<_>>()
         };
         let moving: Vec<ElementId> =
@@ -210,10 +210,10 @@ fn derivatives_match(frequency: f64, iron_material: Material, families: &[(Eleme
         let step = 5e-7;
         let (plus, minus) = (values(step), values(-step));
         for (k, functional) in functionals.iter().enumerate() {
-            let value = functional.evaluate(&model, &start, &state).expect("finite");
+            let value = functional.evaluate((&model, &start, &state)).expect("finite");
             let lambda = adjoint::solve(&mut system, &value.derivative).expect("it converges");
             let implicit =
-                adjoint::node_gradient(&model, &start, &state, &lambda, &moving).expect("one process");
+                adjoint::node_gradient((&model, &start, &state), &lambda, &moving).expect("one process");
             let explicit = value.explicit.unwrap_or_else(|| vec![[0.0; 3]; implicit.len()]);
             let along = |gradient: &[Point]| -> f64 {
                 gradient.iter().zip(&velocity).map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum()

@@ -80,7 +80,7 @@ fn solved(mesh: &Mesh, shape: CoilShape, ampere_turns: c64) -> Result<[c64; 3], 
     };
     let model = FieldModel::new(mesh, setup)?;
     let (field, _) = model.solve(mesh)?;
-    Ok(probe(&field, &model, mesh, "centre", &[[1e-4, 1e-4, 1e-4]])?[0])
+    Ok(probe((&model, mesh, &field), "centre", &[[1e-4, 1e-4, 1e-4]])?[0])
 }
 
 #[test]
@@ -206,7 +206,7 @@ fn no_value_at_a_point_is_mixed_with_those_across_the_face_of_a_winding() {
         };
         let model = FieldModel::new(&mesh, setup).expect("a sound problem");
         let (field, _) = model.solve(&mesh).expect("solved");
-        let found = probe(&field, &model, &mesh, "line", &points).expect("inside");
+        let found = probe((&model, &mesh, &field), "line", &points).expect("inside");
         // Second order has A exactly; of first order B is the mean of an element, and off by half a cell's change of it.
         let allowed = if order == Order::Quadratic { 1e-7 } else { 0.06 };
         for (b, x) in found.iter().zip(points.map(|p| p[0])) {

@@ -61,7 +61,7 @@ fn what_passes_through_a_closed_shell_is_about_the_field_in_it() {
         // In the middle of the whole shell, beside the wall, and outside, where nothing passes from within, but the wall is seen
         // through itself.
         let places = [[0.0; 3], [0.01, 0.02, 0.03], [0.0, 0.0, 0.1]];
-        let found = transmissions(&model, &mesh, &solution, &places);
+        let found = transmissions((&model, &mesh, &solution), &places);
         let [middle, beside, outside] = found[0].flux_densities[..] else { panic!("three places") };
         let exact = in_the_cavity(&material, skin_depth, thickness);
         println!(
@@ -76,7 +76,7 @@ fn what_passes_through_a_closed_shell_is_about_the_field_in_it() {
         let layer = |name: &str, surface| Conductor { name: name.to_owned(), surface, law };
         let conductors = vec![layer("outer", outer), layer("inner", inner)];
         let (model, solution) = solved(&mesh, FieldModelSetup { conductors, ..setup });
-        let layers = transmissions(&model, &mesh, &solution, &places[..1]);
+        let layers = transmissions((&model, &mesh, &solution), &places[..1]);
         let of_inner = layers.iter().find(|own| own.region == "inner").expect("it passes something");
         assert!((of_inner.flux_densities[0] / middle - 1.0).abs() < 1e-6, "{layers:?}");
     }

@@ -102,7 +102,7 @@ fn the_field_on_the_axis_of_a_rectangular_coil_is_that_of_biot_and_savart() {
             shared.get_or_insert_with(|| model.prepare(model.assemble(&mesh)).expect("a definite system"));
         let solution = model.solve_prepared(system, &model.load(&mesh)).expect("it converges");
         let points = HEIGHTS.map(|z| [0.0, 0.0, z]);
-        let field = probe(&solution, &model, &mesh, "axis", &points).expect("the axis lies in the mesh");
+        let field = probe((&model, &mesh, &solution), "axis", &points).expect("the axis lies in the mesh");
         println!("    {corner:?}, {} tets", mesh.topology().tets().len());
         for (z, b) in HEIGHTS.into_iter().zip(field) {
             let exact = AMPERE_TURNS * biot_savart(WINDOW, WIDTH, HEIGHT, corner, z);

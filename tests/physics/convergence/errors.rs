@@ -115,7 +115,7 @@ fn errors(field: &impl KnownField, model: &FieldModel, mesh: &Mesh, solution: &F
         let (tet, inside) = (Tet4::new(vertices), centroid(vertices));
         let conducts = eddy[topology.region_of()[e.index()].index()] != c64::default();
         if e.index() % 7 == 0 {
-            let recovered = recovered_flux_density(solution, model, mesh, e, inside);
+            let recovered = recovered_flux_density((model, mesh, solution), e, inside);
             let exact = field.at(inside, inside).flux_density;
             sums[3][0] += tet.volume * distance(recovered, exact);
             sums[3][1] += tet.volume * distance(exact, zero);

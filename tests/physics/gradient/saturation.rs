@@ -74,7 +74,7 @@ fn holds_saturated(problem: &Problem, p: &[f64], directions: usize, name: &str) 
     let analysis = analysed(problem, p);
     let model = &problem.states()[0];
     let saturation =
-        &fluxmorph_solver::saturation::by_region(model, &analysis.mesh, &analysis.solutions[0])[0];
+        &fluxmorph_solver::saturation::by_region((model, &analysis.mesh, &analysis.solutions[0]))[0];
     let steps = analysis.solutions[0].newton_steps();
     println!("{name}: {steps} steps, {saturation:?}");
     assert!(saturation.share_beyond_knee > 0.05, "a part of the steel saturates");

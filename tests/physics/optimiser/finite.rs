@@ -57,7 +57,7 @@ fn the_checks_take_less_than_a_hundredth_of_an_evaluation() {
     let start = cpu();
     const REPEATS: u32 = 20;
     for _ in 0..REPEATS {
-        finite::state(&problem.states()[0], &analysed.mesh, &analysed.solutions[0]).expect("sound");
+        finite::state((&problem.states()[0], &analysed.mesh, &analysed.solutions[0])).expect("sound");
         finite::analysis(&analysed, problem.constraints()).expect("sound");
     }
     let checks = start.elapsed().as_secs_f64() / f64::from(REPEATS);

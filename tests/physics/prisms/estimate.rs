@@ -80,7 +80,7 @@ fn estimated(mesh: &Mesh, setup: FieldModelSetup, asked: Asked) -> Result<[f64; 
     };
     let fine = coarse.enriched(mesh, Effort::Any)?;
     let mut enriched = Enrichment::new(&coarse, fine, (mesh, &state), None)?;
-    let at = |share| functional.evaluate(enriched.model(), mesh, &enriched.state(share));
+    let at = |share| functional.evaluate((enriched.model(), mesh, &enriched.state(share)));
     let (before, half_way, after) = (at(0.0)?.value, at(0.5)?.derivative, at(1.0)?.value);
     let remainder = enriched.weigh(&coarse, &half_way)?.remainder;
     Ok([before, after - before + remainder])

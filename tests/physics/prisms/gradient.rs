@@ -20,7 +20,7 @@ fn square_derivative(prism: &Prism, mesh: &Mesh, motion: &Motion, discretisation
     let region = mesh.topology().region(OBSERVATION).expect("every mesh has it");
     let observed = Observed::Deviation { target: [0.0; 3], weighting: Weighting::Volume };
     let functional = Functional::observation(&mesh, region, observed, Follow::Held).expect("it has elements");
-    let value = functional.evaluate(&model, &mesh, &state).expect("it is finite");
+    let value = functional.evaluate((&model, &mesh, &state)).expect("it is finite");
     let adjoint = adjoint::solve(&mut system, &value.derivative).expect("it converges");
     let velocity = |n: fluxmorph_geometry::NodeId| motion.of_node(mesh.point(n));
     let topology = mesh.topology();
@@ -31,7 +31,7 @@ fn square_derivative(prism: &Prism, mesh: &Mesh, motion: &Motion, discretisation
         functional.fixed_elements().all(|held| moving.binary_search(&held).is_err()),
         "the observation stays"
     );
-    let gradient = adjoint::node_gradient(&model, &mesh, &state, &adjoint, &moving).expect("one process");
+    let gradient = adjoint::node_gradient((&model, &mesh, &state), &adjoint, &moving).expect("one process");
     topology.nodes().map(|n| dot(gradient[n.index()], velocity(n))).sum()
 }
 

@@ -74,7 +74,7 @@ fn assert_forces(
         let (solution, _) = model.solve(&mesh).expect("it converges");
         for (motion, exact) in expected.clone() {
             let force = Functional::force(&model, &mesh, part, &[body], motion).expect("a layer of air");
-            let found = force.evaluate(&model, &mesh, &solution).expect("finite").value;
+            let found = force.evaluate((&model, &mesh, &solution)).expect("finite").value;
             println!("{}: {found:e}, exact {exact:e}", discretisation.name);
             assert!((found / exact - 1.0).abs() < within, "{}: {found} against {exact}", discretisation.name);
         }

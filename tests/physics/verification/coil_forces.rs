@@ -161,7 +161,7 @@ fn found(mesh: &Mesh, (model, solution): &(FieldModel, FieldSolution), names: &[
         names.iter().map(|name| mesh.topology().region(name).expect("it is named")).collect();
     let motion = RigidMotion::Translation([0.0, 0.0, 1.0]);
     let force = Functional::force(model, mesh, names[0], &regions, motion).expect("a layer of air");
-    4.0 * force.evaluate(model, mesh, solution).expect("finite").value
+    4.0 * force.evaluate((model, mesh, solution)).expect("finite").value
 }
 
 const QUADRATIC: [(ElementFamily, Order); 2] =

@@ -50,7 +50,7 @@ fn team7(family: &str, order: usize) -> Vec<(String, f64)> {
     for line in measured["bz_gauss"].as_array().expect("lines") {
         let [y, z] = ["y_mm", "z_mm"].map(|key| 1e-3 * line[key].as_f64().expect("a place"));
         let points: Vec<[f64; 3]> = numbers(&line["x_mm"]).iter().map(|x| [1e-3 * x, y, z]).collect();
-        let field = probe(solution, model, mesh, "line", &points).expect("points of the mesh");
+        let field = probe((model, mesh, solution), "line", &points).expect("points of the mesh");
         let part = |of: fn(&c64) -> f64| field.iter().map(|b| 1e4 * of(&b[2])).collect();
         compare("Bz", line, [part(|b| b.re), part(|b| -b.im)]);
     }

@@ -105,7 +105,7 @@ fn found_within<const N: usize>(
     names.map(|name| {
         let region = topology.region(name).expect("it is named");
         let force = Functional::force(&model, mesh, name, &[region], motion).expect("a layer of air");
-        force.evaluate(&model, mesh, &solution).expect("finite").value
+        force.evaluate((&model, mesh, &solution)).expect("finite").value
     })
 }
 

@@ -121,7 +121,7 @@ fn behind(name: &str, resolution: Resolution, bar: f64) -> Row {
     let space = space(material, frequency, thickness, filament(radius, 0.0), resolution);
     let (solution, _) = space.model.solve(&space.mesh).expect("it converges");
     let point = [[0.0, 0.0, distance]];
-    let field = probe(&solution, &space.model, &space.mesh, "axis", &point).expect("a point of the mesh");
+    let field = probe((&space.model, &space.mesh, &solution), "axis", &point).expect("a point of the mesh");
     let case = Case::new(format!("plate {name}, {:?}", resolution.order), &space.mesh, &space.model);
     case.row("B behind the plate [T]", field[0][2], exact, bar)
 }
@@ -135,7 +135,7 @@ fn loops(resolution: Resolution, bar: f64) -> Vec<Row> {
     let case = Case::new(format!("circular loops, {:?}", resolution.order), &space.mesh, &space.model);
     let (r, z) = (number(&file["off_axis"], "r_m"), number(&file["off_axis"], "z_m"));
     let side = r / 2f64.sqrt();
-    let field = probe(&solution, &space.model, &space.mesh, "off axis", &[[side, side, z]])
+    let field = probe((&space.model, &space.mesh, &solution), "off axis", &[[side, side, z]])
         .expect("a point of the mesh");
     let radial = (field[0][0] + field[0][1]) / 2f64.sqrt();
     let mut rows = vec![

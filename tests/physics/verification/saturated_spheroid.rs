@@ -142,10 +142,10 @@ fn energy_by_aspect(
 ) -> f64 {
     let region = mesh.topology().region("sphere").expect("the generator makes it");
     let energy = Functional::energy(model, Some(region)).expect("it has elements");
-    let value = energy.evaluate(model, mesh, solution).expect("finite");
+    let value = energy.evaluate((model, mesh, solution)).expect("finite");
     let lambda = adjoint::solve(system, &value.derivative).expect("it converges");
     let moving: Vec<_> = mesh.topology().elements().collect();
-    let implicit = adjoint::node_gradient(model, mesh, solution, &lambda, &moving).expect("one process");
+    let implicit = adjoint::node_gradient((model, mesh, solution), &lambda, &moving).expect("one process");
     let explicit = value.explicit.expect("an energy of a region that moves");
     let along = |(x, (i, f)): (&Point, (&Point, &Point))| -> f64 {
         let rate = |d: usize| share(*x) * x[d] * if d == 2 { 2.0 / 3.0 } else { -1.0 / 3.0 };

@@ -22,7 +22,7 @@ fn cells(order: u8, bar: f64) -> Row {
     let analysis = analysed(problem, &vec![0.0; variables(problem)]);
     let (model, solution) = (&problem.states()[0], &analysis.solutions[0]);
     let objective = problem.objective().expect("an objective");
-    let cells = objective.terms[0].functional.cell_flux_densities(model, &analysis.mesh, solution);
+    let cells = objective.terms[0].functional.cell_flux_densities((model, &analysis.mesh, solution));
     let error = relative_l2(&cells, &ShieldReference::read().flat);
     let name = format!("shield, flat meshed plate, {:?}", model.space().order());
     let case = Case::new(name, &analysis.mesh, model);

@@ -73,7 +73,7 @@ impl Solid {
     /// field is `1/(1 + 2 D/R_o³)` of that in open space.
     fn loss_error(&self) -> f64 {
         let (solution, _) = self.model.solve(&self.mesh).expect("it converges");
-        let value = self.loss().evaluate(&self.model, &self.mesh, &solution).expect("a finite loss").value;
+        let value = self.loss().evaluate((&self.model, &self.mesh, &solution)).expect("a finite loss").value;
         let dipole = complex(&self.data["dipole_T_m3"]);
         let scale = (1.0 / (1.0 + 2.0 * dipole / (BOX * self.radius).powi(3))).norm_sqr();
         (8.0 * value / (scale * number(&self.data, "loss_W")) - 1.0).abs()
@@ -87,14 +87,15 @@ pub(crate) fn solid(name: &str, order: Order, refinement: f64, bars: [f64; 3]) -
     let Solid { data, radius, mesh, model } = &sphere;
     let (solution, mut system) = model.solve(mesh).expect("it converges");
     let case = Case::new(format!("sphere, {name}, {order:?}"), mesh, model);
-    let at = |point: Point| probe(&solution, model, mesh, name, &[point]).expect("a point of the mesh")[0][2];
+    let at =
+        |point: Point| probe((model, mesh, &solution), name, &[point]).expect("a point of the mesh")[0][2];
     let dipole = complex(&data["dipole_T_m3"]);
     let far = 1.5 * radius;
     let [field_bar, loss_bar, derivative_bar] = bars;
-    let value = sphere.loss().evaluate(model, mesh, &solution).expect("a finite loss");
+    let value = sphere.loss().evaluate((model, mesh, &solution)).expect("a finite loss");
     let lambda = adjoint::solve(&mut system, &value.derivative).expect("it converges");
     let moving: Vec<ElementId> = mesh.topology().elements().collect();
-    let implicit = adjoint::node_gradient(model, mesh, &solution, &lambda, &moving).expect("one process");
+    let implicit = adjoint::node_gradient((model, mesh, &solution), &lambda, &moving).expect("one process");
     let explicit = value.explicit.expect("a loss of a region that moves");
     let derivative: f64 = mesh
         .topology()
@@ -163,7 +164,7 @@ pub(crate) fn hollow(order: Order, refinement: f64, bar: f64) -> Vec<Row> {
     let frequency = number(&file, "frequency_Hz");
     let model = FieldModel::new(&mesh, setup(&mesh, frequency, material, order)).expect("a sound problem");
     let (solution, _) = model.solve(&mesh).expect("it converges");
-    let b = probe(&solution, &model, &mesh, "cavity", &[[0.0; 3]]).expect("a point of the mesh")[0][2];
+    let b = probe((&model, &mesh, &solution), "cavity", &[[0.0; 3]]).expect("a point of the mesh")[0][2];
     let case = Case::new(format!("hollow sphere, {order:?}"), &mesh, &model);
     vec![case.row("B in the cavity [T]", b, complex(&data["cavity_T"]), bar)]
 }
@@ -189,7 +190,7 @@ pub(crate) fn impedance(order: Order, refinement: f64, bars: [f64; 2]) -> Vec<Ro
     let (solution, _) = model.solve(&mesh).expect("it converges");
     let case = Case::new(format!("sphere, steel, impedance surface, {order:?}"), &mesh, &model);
     let far = 1.5 * radius;
-    let b = probe(&solution, &model, &mesh, "axis", &[[0.0, 0.0, far]]).expect("a point of the mesh")[0][2];
+    let b = probe((&model, &mesh, &solution), "axis", &[[0.0, 0.0, far]]).expect("a point of the mesh")[0][2];
     let loss: f64 = solution.losses(&model, &mesh).iter().map(|(_, loss)| 8.0 * loss).sum();
     let dipole = complex(&data["dipole_T_m3"]);
     vec![
@@ -213,7 +214,7 @@ pub(crate) fn magnet(order: Order, refinement: f64, recoil: f64, bar: f64) -> Ve
     let model = FieldModel::new(&mesh, setup).expect("a sound problem");
     let (solution, _) = model.solve(&mesh).expect("it converges");
     let at = |point: Point| {
-        probe(&solution, &model, &mesh, "magnet", &[point]).expect("a point of the mesh")[0][2]
+        probe((&model, &mesh, &solution), "magnet", &[point]).expect("a point of the mesh")[0][2]
     };
     let name = match recoil {
         1.0 => format!("magnetised sphere, {order:?}"),

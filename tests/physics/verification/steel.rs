@@ -59,7 +59,7 @@ fn pole(ampere_turns: &str) -> (Solved, f64) {
     let pole = solved.mesh.topology().region("pole").expect("it is named");
     let motion = RigidMotion::Translation([0.0, 0.0, -1.0]);
     let force = Functional::force(&solved.model, &solved.mesh, "pole", &[pole], motion);
-    let force = force.expect("air around the pole").evaluate(&solved.model, &solved.mesh, &solved.solution);
+    let force = force.expect("air around the pole").evaluate((&solved.model, &solved.mesh, &solved.solution));
     let force = 4.0 * force.expect("finite").value;
     (solved, force)
 }

@@ -62,7 +62,7 @@ impl AdjointAccumulator {
                 state.response(winding).into_iter().for_each(|response| work.report.include(response));
             }
             work.timings.state += clock.lap();
-            let evaluated = term.functional.evaluate(model, work.mesh, state);
+            let evaluated = term.functional.evaluate((model, work.mesh, state));
             let FunctionalValue { value, derivative, explicit, inductances } =
                 evaluated.map_err(finite::of_term(owner, term, model))?;
             self.values[number] += value;
@@ -77,7 +77,7 @@ impl AdjointAccumulator {
             self.add_nodal(term.weight, explicit.as_deref().unwrap_or_default());
             if !inductances.is_empty() {
                 let moving = shape.motion().moving();
-                let nodal = adjoint::inductance_gradient(model, work.mesh, state, &inductances, moving)?;
+                let nodal = adjoint::inductance_gradient((model, work.mesh, state), &inductances, moving)?;
                 self.add_nodal(term.weight, &nodal);
             }
         }
@@ -89,7 +89,7 @@ impl AdjointAccumulator {
         work.report.include_adjoint(&lambda, work.adjoint_tolerance);
         work.timings.adjoint += clock.lap();
         work.progress.stage(Stage::Differentiating);
-        let nodal = adjoint::node_gradient(model, work.mesh, state, &lambda, shape.motion().moving())?;
+        let nodal = adjoint::node_gradient((model, work.mesh, state), &lambda, shape.motion().moving())?;
         self.add_nodal(1.0, &nodal);
         work.timings.gradient += clock.lap();
         Ok(())

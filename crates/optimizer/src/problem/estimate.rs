@@ -203,9 +203,9 @@ impl State<'_> {
         let mut right_side = vec![c64::default(); model.unknown_count()];
         let mut inductances = Vec::new();
         for term in own() {
-            let at = |state| term.functional.evaluate(model, mesh, state);
+            let at = |state| term.functional.evaluate((model, mesh, state));
             // A field that is recovered from the same potentials is another one in either order.
-            let before = term.functional.evaluate(self.coarse, mesh, solution)?;
+            let before = term.functional.evaluate((self.coarse, mesh, solution))?;
             error += term.weight * (at(&after)?.value - before.value);
             let FunctionalValue { derivative, inductances: of_term, .. } = at(&half_way)?;
             right_side.resize(right_side.len().max(derivative.len()), c64::default());

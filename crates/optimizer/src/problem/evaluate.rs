@@ -136,7 +136,7 @@ impl Problem {
         let Moved { mesh, displacement, inversion, .. } = moved;
         let quality = self.quality(&mesh);
         let analysis = Analysis {
-            forces: self.forces(|body, state| body.force(&self.states[state], &mesh, &solutions[state])),
+            forces: self.forces(|body, state| body.force((&self.states[state], &mesh, &solutions[state]))),
             displacement,
             inversion,
             solutions,
@@ -269,7 +269,7 @@ impl Problem {
                 (system, state.with_responses_of(other))
             }
         };
-        finite::state(model, work.mesh, &state)?;
+        finite::state((model, work.mesh, &state))?;
         work.report.include(&state);
         Ok(Solved { index, model, system, state })
     }

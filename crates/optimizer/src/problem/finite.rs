@@ -5,10 +5,10 @@
 //! name, as [`Error::NotFinite`], so that no file holds a `NaN`, an infinity, or the `null` that JSON writes for them. One
 //! pass over unknowns, nodes and variables; docs/robustness.md has what it costs and what a run does then.
 
+use fluxmorph_geometry::Readable;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{Mesh, Readable};
-use fluxmorph_solver::{FieldModel, FieldSolution, SolverError};
+use fluxmorph_solver::{FieldModel, FieldState, SolverError};
 
 use crate::constraint::Constraint;
 use crate::error::Error;
@@ -63,7 +63,7 @@ const SAFE_POTENTIAL: f64 = 1e60;
 ///
 /// # Errors
 /// [`Error::NotFinite`] names the first element's quantity, region and frequency.
-pub fn state(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Result<(), Error> {
+pub fn state((model, mesh, solution): FieldState<'_>) -> Result<(), Error> {
     let is_safe = |v: &c64| v.re.abs() <= SAFE_POTENTIAL && v.im.abs() <= SAFE_POTENTIAL;
     if solution.values().iter().all(is_safe) {
         return Ok(());

@@ -43,7 +43,7 @@ use crate::element::{Complex3, dot3};
 use crate::fixed_directions::CREASE;
 use crate::model::FieldModel;
 use crate::reentrant::is_reentrant;
-use crate::solution::FieldSolution;
+use crate::solution::{FieldSolution, FieldState};
 use crate::surface::{Conductor, SurfaceLaw};
 
 /// Widths of a strip beside an edge, in skin depths.
@@ -125,7 +125,7 @@ struct SurfaceTriangle {
 }
 
 /// What the impedance surfaces of a field leave out of the losses of their conductors.
-pub fn excess_losses(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<ExcessLoss> {
+pub fn excess_losses((model, mesh, solution): FieldState<'_>) -> Vec<ExcessLoss> {
     if model.conductors().iter().all(|own| !matches!(own.law, SurfaceLaw::Impedance(_))) {
         return Vec::new();
     }

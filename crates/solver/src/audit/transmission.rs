@@ -11,19 +11,18 @@
 
 use std::f64::consts::{PI, TAU};
 
+use fluxmorph_geometry::NodeId;
 use fluxmorph_geometry::directions::unit;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::{Point, area_vector, centroid, cross, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{Mesh, NodeId};
 use rayon::prelude::*;
 
 use super::inside_of_outer_faces;
 use super::walls::{Wall, walls};
 use crate::element::dot3;
-use crate::model::FieldModel;
 use crate::recovery::Plane;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 use crate::surface::{Conductor, SurfaceLaw};
 
 /// Skin depths beyond which a wall passes nothing that matters: `2 e^(−t/δ)` is 2e-9.
@@ -46,12 +45,7 @@ struct Exit {
 }
 
 /// What passes through the impedance surfaces of a field, at places beside them; those that pass nothing are left out.
-pub fn transmissions(
-    model: &FieldModel,
-    mesh: &Mesh,
-    solution: &FieldSolution,
-    places: &[Point],
-) -> Vec<Transmission> {
+pub fn transmissions((model, mesh, solution): FieldState<'_>, places: &[Point]) -> Vec<Transmission> {
     let inside = inside_of_outer_faces(mesh);
     let of = |conductor: &Conductor| {
         let SurfaceLaw::Impedance(material) = conductor.law else { return None };

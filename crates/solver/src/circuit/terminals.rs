@@ -1,6 +1,5 @@
 //! What the terminals of coils see of a state, and the matrix of their inductances.
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 
 use super::{Driven, Windings, product};
@@ -8,7 +7,7 @@ use crate::coil::CoilShape;
 use crate::error::SolverError;
 use crate::linear::PreparedSystem;
 use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::{FieldSolution, FieldState};
 
 /// What the terminals of a coil see, peak phasors.
 #[derive(Clone, Debug, PartialEq)]
@@ -62,7 +61,7 @@ impl Windings {
     }
 
     /// Flux linkage [Wb] of a winding in a state.
-    pub(crate) fn linkage(&self, k: usize, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> c64 {
+    pub(crate) fn linkage(&self, k: usize, (model, mesh, state): FieldState<'_>) -> c64 {
         if let Some(segments) = &self.coils[k].solid {
             return state.solid_unknowns(model)[segments.clone()].iter().sum();
         }
@@ -71,12 +70,7 @@ impl Windings {
 }
 
 /// `F_jᵀ K⁻¹ F_k` [H], by rows; the responses are those of the state, or solved for.
-fn mutual(
-    model: &FieldModel,
-    mesh: &Mesh,
-    coils: &[Driven],
-    state: &FieldSolution,
-) -> Result<Vec<Vec<c64>>, SolverError> {
+fn mutual((model, mesh, state): FieldState<'_>, coils: &[Driven]) -> Result<Vec<Vec<c64>>, SolverError> {
     let mut system: Option<PreparedSystem> = None;
     let mut respond = |(k, driven): (usize, &Driven)| -> Result<Vec<c64>, SolverError> {
         if let Some(response) = state.response(k) {
@@ -93,10 +87,10 @@ fn mutual(
 }
 
 /// Flux linkages [Wb] of the coils with windings in a state, with their names.
-pub fn flux_linkages(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<(String, c64)> {
+pub fn flux_linkages((model, mesh, solution): FieldState<'_>) -> Vec<(String, c64)> {
     let windings = model.windings();
     let of = |(k, driven): (usize, &Driven)| {
-        (model.coils()[driven.coil].name.clone(), windings.linkage(k, model, mesh, solution))
+        (model.coils()[driven.coil].name.clone(), windings.linkage(k, (model, mesh, solution)))
     };
     windings.coils.iter().enumerate().map(of).collect()
 }
@@ -112,11 +106,11 @@ pub fn currents(model: &FieldModel, solution: &FieldSolution) -> Vec<(String, c6
 
 /// Complex powers `½ V I*` [W] of the coils with windings in a state, with their names: of the voltage across a coil with its
 /// resistance.
-pub fn powers(model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<(String, c64)> {
+pub fn powers((model, mesh, solution): FieldState<'_>) -> Vec<(String, c64)> {
     let windings = model.windings();
     let of = |(k, driven): (usize, &Driven)| {
         let current = windings.current(k, model, solution);
-        let voltage = driven.voltage(model, current, windings.linkage(k, model, mesh, solution));
+        let voltage = driven.voltage(model, current, windings.linkage(k, (model, mesh, solution)));
         (model.coils()[driven.coil].name.clone(), 0.5 * voltage * current.conj())
     };
     windings.coils.iter().enumerate().map(of).collect()
@@ -137,20 +131,16 @@ pub fn direct_resistances(model: &FieldModel) -> Vec<(String, f64)> {
 ///
 /// # Errors
 /// As [`FieldModel::prepare`] and [`PreparedSystem::solve`].
-pub fn terminals(
-    model: &FieldModel,
-    mesh: &Mesh,
-    solution: &FieldSolution,
-) -> Result<Terminals, SolverError> {
+pub fn terminals((model, mesh, solution): FieldState<'_>) -> Result<Terminals, SolverError> {
     let windings = model.windings();
     let coils = &windings.coils;
     if coils.is_empty() {
         return Ok(Terminals::default());
     }
     let angular_frequency = model.angular_frequency();
-    let mutual = if model.is_linear() { mutual(model, mesh, coils, solution)? } else { Vec::new() };
+    let mutual = if model.is_linear() { mutual((model, mesh, solution), coils)? } else { Vec::new() };
     let of = |(k, driven): (usize, &Driven)| {
-        let flux_linkage = windings.linkage(k, model, mesh, solution);
+        let flux_linkage = windings.linkage(k, (model, mesh, solution));
         let current = windings.current(k, model, solution);
         let wire = driven.winding.resistance;
         let is_at_rest = current == c64::default() || driven.winding.voltage == Some(c64::default());

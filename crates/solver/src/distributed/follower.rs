@@ -66,7 +66,7 @@ impl Follower {
         let local = self.model.discretisation().local.as_ref();
         let triangles = local.map(|local| local.owned_triangles.as_slice());
         let extent = Extent { moving: &self.moving, triangles };
-        let mut gradient = adjoint::gradient_of(&self.model, mesh, &state, &lambda, &extent);
+        let mut gradient = adjoint::gradient_of((&self.model, mesh, &state), &lambda, &extent);
         ranks.sum(gradient.as_flattened_mut());
         Ok(if ranks.rank() == 0 { gradient.into_flattened() } else { Vec::new() })
     }

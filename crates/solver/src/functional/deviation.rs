@@ -6,31 +6,25 @@
 //! an expansion and what is left of it are of the recovered field. The elements' volumes are the picture's weights, not the
 //! functional's, which may count cells.
 
+use fluxmorph_geometry::ElementId;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::centroid;
-use fluxmorph_geometry::{ElementId, Mesh};
 use rayon::prelude::*;
 
 use super::{Functional, MultipoleFunctional, Observation};
 use crate::Order;
-use crate::model::FieldModel;
 use crate::recovery::RecoveredPoint;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 
 /// Barycentric coordinates of the middle.
 const MIDDLE: [f64; 4] = [0.25; 4];
 
 impl Functional {
     /// The deviation [T] of every element that takes part, each once, in no order; empty for what is no quality of a field.
-    pub fn deviations(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Vec<(ElementId, f64)> {
+    pub fn deviations(&self, state: FieldState<'_>) -> Vec<(ElementId, f64)> {
         match self {
-            Self::Observation(observation) => of_observation(observation, model, mesh, solution),
-            Self::Multipole(functional) => of_expansion(functional, model, mesh, solution),
+            Self::Observation(observation) => of_observation(observation, state),
+            Self::Multipole(functional) => of_expansion(functional, state),
             _ => Vec::new(),
         }
     }
@@ -38,28 +32,22 @@ impl Functional {
 
 fn of_observation(
     observation: &Observation,
-    model: &FieldModel,
-    mesh: &Mesh,
-    solution: &FieldSolution,
+    (model, mesh, solution): FieldState<'_>,
 ) -> Vec<(ElementId, f64)> {
-    let Some(deviation) = observation.deviation_of(model, mesh, solution) else { return Vec::new() };
+    let Some(deviation) = observation.deviation_of((model, mesh, solution)) else { return Vec::new() };
     let at = |e| (e, deviation(solution.at(model, mesh, e, &MIDDLE).flux_density));
     observation.elements_on(model, mesh).into_iter().map(at).collect()
 }
 
-fn of_expansion(
-    functional: &MultipoleFunctional,
-    model: &FieldModel,
-    mesh: &Mesh,
-    solution: &FieldSolution,
-) -> Vec<(ElementId, f64)> {
-    let Some(main) = functional.main_field(model, mesh, solution) else { return Vec::new() };
+fn of_expansion(functional: &MultipoleFunctional, state: FieldState<'_>) -> Vec<(ElementId, f64)> {
+    let (model, mesh, solution) = state;
+    let Some(main) = functional.main_field(state) else { return Vec::new() };
     let inside: Vec<ElementId> =
         mesh.topology().elements().filter(|&e| main.domain().meets(mesh.vertices(e))).collect();
     let at = |&e: &ElementId| {
         let middle = centroid(mesh.vertices(e));
         let b = match model.setup().order {
-            Order::Linear => RecoveredPoint::new(model, mesh, e, middle).flux_density(solution, model, mesh),
+            Order::Linear => RecoveredPoint::new(model, mesh, e, middle).flux_density(state),
             Order::Quadratic => solution.at(model, mesh, e, &MIDDLE).flux_density,
         };
         let left = main.remainder(middle, b);

@@ -23,7 +23,7 @@ use crate::element::virtual_work::VirtualWork;
 use crate::error::SolverError;
 use crate::family::LocalIntegral;
 use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 use crate::surface::Conductor;
 
 /// A component of force or torque: the work per unit of a rigid motion.
@@ -142,14 +142,9 @@ impl Force {
 
     /// What acts on every node of the body [N], ascending by node: minus the work of the stress in the layer along its velocity.
     /// Sums of it are force and torque; nodes inside the body have nothing.
-    pub fn nodal(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> BTreeMap<NodeId, Point> {
+    pub fn nodal(&self, (model, mesh, solution): FieldState<'_>) -> BTreeMap<NodeId, Point> {
         let topology = model.topology();
-        let of_element = |&e: &ElementId| virtual_work((solution, model, mesh), e, &[[0.0; 3]; 4]).1;
+        let of_element = |&e: &ElementId| virtual_work((model, mesh, solution), e, &[[0.0; 3]; 4]).1;
         // Computed in parallel, added in the order of the elements.
         let terms: Vec<[Point; 4]> = self.layer.par_iter().map(of_element).collect();
         let mut sums = BTreeMap::new();
@@ -164,12 +159,7 @@ impl Force {
         sums
     }
 
-    pub(super) fn evaluate(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> FunctionalValue {
+    pub(super) fn evaluate(&self, (model, mesh, solution): FieldState<'_>) -> FunctionalValue {
         let free =
             |node: NodeId, vector: Point| self.body.get(&node).map_or([0.0; 3], |held| beside(held, vector));
         let mut sum = Sum::new(model);
@@ -177,7 +167,7 @@ impl Force {
             let nodes = model.topology().tet(e);
             // Minus the rate: the velocities are turned round.
             let velocities = nodes.map(|node| free(node, self.motion.velocity(mesh.point(node))).map(|v| -v));
-            let (mut rate, by_velocity) = virtual_work((solution, model, mesh), e, &velocities);
+            let (mut rate, by_velocity) = virtual_work((model, mesh, solution), e, &velocities);
             if let RigidMotion::Rotation { axis, .. } = self.motion {
                 // A node of the body that moves by δx has the velocity axis × δx more.
                 for (k, &node) in nodes.iter().enumerate() {
@@ -193,7 +183,7 @@ impl Force {
 
 /// The work of the stress in an element along velocities of its vertices, with its derivatives, and the derivatives by the velocities.
 fn virtual_work(
-    (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+    (model, mesh, solution): FieldState<'_>,
     e: ElementId,
     velocities: &[Point; 4],
 ) -> (LocalIntegral<4>, [Point; 4]) {

@@ -4,7 +4,7 @@
 
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{CarrierId, ElementId, Mesh, NodeId, RegionId};
+use fluxmorph_geometry::{CarrierId, ElementId, NodeId, RegionId};
 use rayon::prelude::*;
 
 use super::{FunctionalValue, is_static};
@@ -15,7 +15,7 @@ use crate::error::SolverError;
 use crate::family::{Cell, Family, Local, LocalIntegral};
 use crate::model::FieldModel;
 use crate::nonlinear;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 use crate::surface::{SurfaceLaw, SurfaceTerm};
 
 /// Elements whose integrals are held at once: some megabytes.
@@ -70,12 +70,7 @@ impl Integral {
         Ok(Self::Energy(elements))
     }
 
-    pub(super) fn evaluate(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> FunctionalValue {
+    pub(super) fn evaluate(&self, (model, mesh, solution): FieldState<'_>) -> FunctionalValue {
         let mut sum = Sum::new(model);
         let space = model.space();
         let elements = space.elements();

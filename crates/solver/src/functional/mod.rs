@@ -24,7 +24,7 @@ use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use crate::element::Complex3;
 use crate::error::SolverError;
 use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 pub use force::{Force, RigidMotion, resultant};
 pub use homogeneity::{Compared, FieldQuality};
 pub use inductance::{InductanceFunctional, Inductive};
@@ -173,27 +173,17 @@ impl Functional {
     }
 
     /// Mean flux density [T] of every observation cell, shape `(n_cells, 3)`; empty for an integral.
-    pub fn cell_flux_densities(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Vec<Complex3> {
+    pub fn cell_flux_densities(&self, state: FieldState<'_>) -> Vec<Complex3> {
         match self {
-            Self::Observation(observation) => observation.cell_flux_densities(model, mesh, solution),
+            Self::Observation(observation) => observation.cell_flux_densities(state),
             _ => Vec::new(),
         }
     }
 
     /// How homogeneous the field is, where that is what is observed.
-    pub fn field_quality(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Option<FieldQuality> {
+    pub fn field_quality(&self, state: FieldState<'_>) -> Option<FieldQuality> {
         match self {
-            Self::Observation(observation) => observation.field_quality(model, mesh, solution),
+            Self::Observation(observation) => observation.field_quality(state),
             _ => None,
         }
     }
@@ -202,19 +192,15 @@ impl Functional {
     ///
     /// # Errors
     /// [`SolverError::NotFinite`]; [`SolverError::Covered`]; [`SolverError::Parameter`] where the state lacks a response of [`Functional::windings`].
-    pub fn evaluate(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Result<FunctionalValue, SolverError> {
+    pub fn evaluate(&self, state: FieldState<'_>) -> Result<FunctionalValue, SolverError> {
+        let (model, mesh, solution) = state;
         let result = match self {
-            Self::Observation(observation) => observation.evaluate(model, mesh, solution)?,
-            Self::Integral(integral) => integral.evaluate(model, mesh, solution),
-            Self::Force(force) => force.evaluate(model, mesh, solution),
-            Self::Terminal(terminal) => terminal.evaluate(model, mesh, solution),
+            Self::Observation(observation) => observation.evaluate(state)?,
+            Self::Integral(integral) => integral.evaluate(state),
+            Self::Force(force) => force.evaluate(state),
+            Self::Terminal(terminal) => terminal.evaluate(state),
             Self::Inductance(inductance) => inductance.evaluate(model, solution)?,
-            Self::Multipole(multipole) => multipole.evaluate(model, mesh, solution)?,
+            Self::Multipole(multipole) => multipole.evaluate(state)?,
             Self::Volume(volume) => volume.evaluate(mesh),
         };
         if !result.value.is_finite() {

@@ -20,7 +20,7 @@ use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
 use crate::multipole::{Domain, Expansion, Harmonic};
 use crate::recovery::{BlendedField, FixedPlaces, RecoveredPoint};
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 
 /// Places between the centre of an expansion and each of its points, as shares of the way, at which matter is looked for.
 const WITHIN: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
@@ -63,27 +63,22 @@ enum At<'a> {
     InSpace(Box<BlendedField<'a>>),
 }
 
-/// A state with its model and mesh.
-type State<'a> = (&'a FieldSolution, &'a FieldModel, &'a Mesh);
-
 impl Places {
-    fn at<'a>(&'a self, (solution, model, mesh): State<'a>) -> Result<At<'a>, SolverError> {
+    fn at<'a>(&'a self, (model, mesh, solution): FieldState<'a>) -> Result<At<'a>, SolverError> {
         Ok(match self {
             Self::Held { order, points, .. } if *order == model.space().order() => {
                 At::Held(Cow::Borrowed(points))
             }
             Self::Held { places, .. } => At::Held(Cow::Owned(recovered(places, model, mesh))),
-            Self::InSpace(places) => At::InSpace(Box::new(places.field((solution, model, mesh))?)),
+            Self::InSpace(places) => At::InSpace(Box::new(places.field((model, mesh, solution))?)),
         })
     }
 }
 
 impl At<'_> {
-    fn flux_densities(&self, (solution, model, mesh): State<'_>) -> Vec<Complex3> {
+    fn flux_densities(&self, state: FieldState<'_>) -> Vec<Complex3> {
         match self {
-            Self::Held(points) => {
-                points.iter().map(|point| point.flux_density(solution, model, mesh)).collect()
-            }
+            Self::Held(points) => points.iter().map(|point| point.flux_density(state)).collect(),
             Self::InSpace(field) => field.flux_densities(),
         }
     }
@@ -237,13 +232,7 @@ impl Multipoles {
     ///
     /// # Errors
     /// [`SolverError::Covered`] for a place that something which moves has reached.
-    pub fn coefficients(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        state: &FieldSolution,
-    ) -> Result<Vec<(Harmonic, c64)>, SolverError> {
-        let state = (state, model, mesh);
+    pub fn coefficients(&self, state: FieldState<'_>) -> Result<Vec<(Harmonic, c64)>, SolverError> {
         Ok(self.coefficients_of(&self.places.at(state)?.flux_densities(state)))
     }
 
@@ -346,14 +335,9 @@ impl MultipoleFunctional {
     }
 
     /// What the content is compared with; `None` for a single coefficient.
-    pub(super) fn main_field(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        state: &FieldSolution,
-    ) -> Option<MainField> {
+    pub(super) fn main_field(&self, state: FieldState<'_>) -> Option<MainField> {
         let OfTerms::Content { main, .. } = &self.of else { return None };
-        let mut terms = self.multipoles.coefficients(model, mesh, state).ok()?;
+        let mut terms = self.multipoles.coefficients(state).ok()?;
         terms.retain(|(term, _)| main.contains(term));
         Some(MainField { domain: self.multipoles.domain, terms })
     }
@@ -365,13 +349,8 @@ impl MultipoleFunctional {
         }
     }
 
-    pub(super) fn evaluate(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        state: &FieldSolution,
-    ) -> Result<FunctionalValue, SolverError> {
-        let state = (state, model, mesh);
+    pub(super) fn evaluate(&self, state: FieldState<'_>) -> Result<FunctionalValue, SolverError> {
+        let (model, mesh, _) = state;
         let at = self.multipoles.places.at(state)?;
         let fields = at.flux_densities(state);
         let coefficients = self.multipoles.coefficients_of(&fields);

@@ -19,7 +19,7 @@ use crate::elements::Order;
 use crate::error::SolverError;
 use crate::model::FieldModel;
 use crate::recovery::{FixedPlaces, scatter_flux};
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 
 /// How observation cells are weighted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -155,28 +155,18 @@ impl Observation {
     }
 
     /// Mean flux density of every cell [T], shape `(n_cells, 3)`.
-    pub fn cell_flux_densities(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Vec<Complex3> {
-        self.cells.iter().map(|cell| mean(cell, &[0.25; 4], 1.0, model, mesh, solution).0).collect()
+    pub fn cell_flux_densities(&self, state: FieldState<'_>) -> Vec<Complex3> {
+        self.cells.iter().map(|cell| mean(cell, &[0.25; 4], 1.0, state).0).collect()
     }
 
-    pub(super) fn evaluate(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Result<FunctionalValue, SolverError> {
+    pub(super) fn evaluate(&self, state: FieldState<'_>) -> Result<FunctionalValue, SolverError> {
+        let (model, mesh, _) = state;
         let mut derivative = vec![c64::default(); model.unknown_count()];
         let nodes = mesh.points().len();
         let mut explicit = (self.follow != Follow::Held).then(|| vec![[0.0; 3]; nodes]);
-        let field = (solution, model, mesh);
         let value = match (&self.fixed, &mut explicit) {
             (Some(fixed), Some(explicit)) => {
-                let blended = fixed.places.field(field)?;
+                let blended = fixed.places.field(state)?;
                 let fields = blended.flux_densities();
                 let of = self.of_samples(&fixed.means(&fields), model);
                 let mut by_fields = vec![[c64::default(); 3]; fields.len()];
@@ -188,7 +178,7 @@ impl Observation {
                 blended.add_derivatives(&by_fields, (&mut derivative, explicit));
                 of.value
             }
-            (_, explicit) => self.differentiate(field, &mut derivative, explicit.as_deref_mut()),
+            (_, explicit) => self.differentiate(state, &mut derivative, explicit.as_deref_mut()),
         };
         Ok(FunctionalValue { value, derivative, explicit, ..Default::default() })
     }
@@ -196,11 +186,11 @@ impl Observation {
     /// The value in cells of the mesh, with its derivatives added to those by potentials and by positions.
     fn differentiate(
         &self,
-        (solution, model, mesh): (&FieldSolution, &FieldModel, &Mesh),
+        (model, mesh, solution): FieldState<'_>,
         derivative: &mut [c64],
         mut explicit: Option<&mut [Point]>,
     ) -> f64 {
-        let samples = self.samples_of_cells(model, mesh, solution);
+        let samples = self.samples_of_cells((model, mesh, solution));
         let of = self.of_samples(&samples, model);
         let rule = self.rule(model.space().order());
         let places = self.cells.iter().flat_map(|c| rule.iter().map(move |q| (c, q)));
@@ -247,20 +237,14 @@ impl Observation {
     ///
     /// # Errors
     /// [`SolverError::Covered`].
-    fn samples(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Result<Vec<Sample>, SolverError> {
-        let Some(fixed) = &self.fixed else { return Ok(self.samples_of_cells(model, mesh, solution)) };
-        Ok(fixed.means(&fixed.places.field((solution, model, mesh))?.flux_densities()))
+    fn samples(&self, state: FieldState<'_>) -> Result<Vec<Sample>, SolverError> {
+        let Some(fixed) = &self.fixed else { return Ok(self.samples_of_cells(state)) };
+        Ok(fixed.means(&fixed.places.field(state)?.flux_densities()))
     }
 
-    fn samples_of_cells(&self, model: &FieldModel, mesh: &Mesh, solution: &FieldSolution) -> Vec<Sample> {
-        let rule = self.rule(model.space().order());
-        let at =
-            |cell| rule.iter().map(move |(lambda, share)| mean(cell, lambda, *share, model, mesh, solution));
+    fn samples_of_cells(&self, state: FieldState<'_>) -> Vec<Sample> {
+        let rule = self.rule(state.0.space().order());
+        let at = |cell| rule.iter().map(move |(lambda, share)| mean(cell, lambda, *share, state));
         self.cells.iter().flat_map(|cell| at(cell)).collect()
     }
 
@@ -309,14 +293,9 @@ impl Observation {
     }
 
     /// How homogeneous the field is, where that is what is observed.
-    pub(super) fn field_quality(
-        &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
-    ) -> Option<FieldQuality> {
+    pub(super) fn field_quality(&self, (model, mesh, solution): FieldState<'_>) -> Option<FieldQuality> {
         let Observed::Homogeneity { of, weighting } = self.observed else { return None };
-        let samples = self.samples(model, mesh, solution).ok()?;
+        let samples = self.samples((model, mesh, solution)).ok()?;
         let odd = self.odd_directions(model);
         Some(Spread::new(&weighted(&samples, weighting), of, &odd).quality())
     }
@@ -324,16 +303,14 @@ impl Observation {
     /// What a flux density [T] misses of what is asked for [T], where a quality of the field is.
     pub(super) fn deviation_of(
         &self,
-        model: &FieldModel,
-        mesh: &Mesh,
-        solution: &FieldSolution,
+        (model, mesh, solution): FieldState<'_>,
     ) -> Option<impl Fn(Complex3) -> f64 + use<>> {
         let (compared, ideal) = match self.observed {
             Observed::Deviation { target, .. } if target != [0.0; 3] => {
                 (Compared::Vector, target.map(c64::from))
             }
             Observed::Homogeneity { of, weighting } => {
-                let samples = weighted(&self.samples(model, mesh, solution).ok()?, weighting);
+                let samples = weighted(&self.samples((model, mesh, solution)).ok()?, weighting);
                 (of, Spread::new(&samples, of, &self.odd_directions(model)).mean())
             }
             Observed::Deviation { .. } | Observed::Component { .. } => return None,
@@ -434,9 +411,7 @@ fn mean(
     cell: &[ElementId],
     lambda: &[f64; 4],
     share: f64,
-    model: &FieldModel,
-    mesh: &Mesh,
-    solution: &FieldSolution,
+    (model, mesh, solution): FieldState<'_>,
 ) -> (Complex3, f64) {
     let mut sum = [c64::default(); 3];
     let mut volume = 0.0;

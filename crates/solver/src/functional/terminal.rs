@@ -4,13 +4,12 @@
 //! ([`crate::circuit`]). With `V = Z I + jωλ` across the coil and what is in series, a function `g(I, λ)` has
 //! `∂F/∂u = ∂g/∂λ F` and `∂F/∂I`, which stands behind the field's unknowns.
 
-use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 
 use super::FunctionalValue;
 use crate::error::SolverError;
 use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 
 /// What is made of current and flux linkage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,11 +49,11 @@ impl TerminalFunctional {
         Ok(Self { winding, of })
     }
 
-    pub(super) fn evaluate(&self, model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> FunctionalValue {
+    pub(super) fn evaluate(&self, (model, mesh, state): FieldState<'_>) -> FunctionalValue {
         let (windings, omega) = (model.windings(), model.angular_frequency());
         let winding = windings.winding(self.winding);
         let current = windings.current(self.winding, model, state);
-        let linkage = windings.linkage(self.winding, model, mesh, state);
+        let linkage = windings.linkage(self.winding, (model, mesh, state));
         let (value, by_current, by_linkage) = if omega == 0.0 {
             (linkage.re, c64::default(), c64::new(0.5, 0.0))
         } else {

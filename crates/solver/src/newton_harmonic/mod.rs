@@ -27,7 +27,7 @@ use crate::linear::{Left, LinearSolverReport, PreparedSystem, RealLinear};
 use crate::model::FieldModel;
 use crate::newton::{self, NewtonObserver, NewtonProgress};
 use crate::newton_steps::{Descent, MOST_STEPS, StepSystems, Verdict};
-use crate::solution::FieldSolution;
+use crate::solution::{FieldSolution, FieldState};
 use crate::tangents::Tangents;
 
 mod search;
@@ -103,7 +103,7 @@ impl HarmonicTangent {
         let law = |position: usize, point: usize, b: Complex3| {
             self.points[position][point].map_or_else(Complex3::default, |law| law.derivative(side, b))
         };
-        add_strengths(&self.model, &self.mesh, &change, &law, &mut y);
+        add_strengths((&self.model, &self.mesh, &change), &law, &mut y);
         y.resize(x.len(), c64::default());
         y
     }
@@ -194,9 +194,7 @@ impl RealLinear for HarmonicTangent {
 
 /// Adds `∫H·curl w` over the elements with a law, for an `H` by position of the element, point and `B`.
 fn add_strengths(
-    model: &FieldModel,
-    mesh: &Mesh,
-    state: &FieldSolution,
+    (model, mesh, state): FieldState<'_>,
     strength: &(dyn Fn(usize, usize, Complex3) -> Complex3 + Sync),
     sum: &mut [c64],
 ) {
@@ -322,7 +320,7 @@ impl<'a> Problem<'a> {
             std::array::from_fn(|d| h[d] - linear * b[d])
         };
         let state = FieldSolution::of_state(values[..count].to_vec());
-        add_strengths(self.model, self.mesh, &state, &strength, &mut residual);
+        add_strengths((self.model, self.mesh, &state), &strength, &mut residual);
         Iterate { values, residual }
     }
 

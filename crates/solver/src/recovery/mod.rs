@@ -35,7 +35,7 @@ use crate::element::tabulated::Rule;
 use crate::elements::{ElementFamily, Order};
 use crate::error::{PointsOf, SolverError};
 use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 use fit::Fit;
 pub(crate) use mirror::Walls;
 use mirror::{Image, Mirrors};
@@ -104,10 +104,10 @@ impl RecoveredPoint {
     }
 
     /// `B` [T] there.
-    pub fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+    pub fn flux_density(&self, (model, mesh, solution): FieldState<'_>) -> Complex3 {
         let mut sum = [c64::default(); 3];
         for (turn, weights) in &self.images {
-            let part = turned(turn, weights.flux_density(solution, model, mesh));
+            let part = turned(turn, weights.flux_density((model, mesh, solution)));
             (0..3).for_each(|d| sum[d] += part[d]);
         }
         sum
@@ -133,7 +133,7 @@ fn turned(t: &[Point; 3], v: Complex3) -> Complex3 {
 }
 
 impl Weights {
-    fn flux_density(&self, solution: &FieldSolution, model: &FieldModel, mesh: &Mesh) -> Complex3 {
+    fn flux_density(&self, (model, mesh, solution): FieldState<'_>) -> Complex3 {
         let mut sum = [c64::default(); 3];
         match self {
             Self::Potentials(nodes) => {
@@ -225,13 +225,11 @@ pub(crate) fn scatter_flux(
 
 /// The recovered flux density [T] at a point of an element ([`RecoveredPoint`]).
 pub fn recovered_flux_density(
-    solution: &FieldSolution,
-    model: &FieldModel,
-    mesh: &Mesh,
+    (model, mesh, solution): FieldState<'_>,
     element: ElementId,
     point: Point,
 ) -> Complex3 {
-    RecoveredPoint::new(model, mesh, element, point).flux_density(solution, model, mesh)
+    RecoveredPoint::new(model, mesh, element, point).flux_density((model, mesh, solution))
 }
 
 /// The curl at a point of an element of the polynomial fitted to the potentials at the nodes of a patch.
@@ -294,9 +292,7 @@ fn by_image<W>(
 /// # Errors
 /// [`SolverError::PointOutside`] for the first point that no element holds.
 pub fn probe(
-    solution: &FieldSolution,
-    model: &FieldModel,
-    mesh: &Mesh,
+    (model, mesh, solution): FieldState<'_>,
     name: &str,
     points: &[Point],
 ) -> Result<Vec<Complex3>, SolverError> {
@@ -310,6 +306,6 @@ pub fn probe(
         .collect::<Result<Vec<(ElementId, Point)>, _>>()?;
     Ok(elements
         .into_par_iter()
-        .map(|(e, point)| recovered_flux_density(solution, model, mesh, e, point))
+        .map(|(e, point)| recovered_flux_density((model, mesh, solution), e, point))
         .collect())
 }

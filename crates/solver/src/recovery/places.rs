@@ -22,7 +22,7 @@ use crate::element::quadrature::Node;
 use crate::element::{Complex3, dot3};
 use crate::error::SolverError;
 use crate::model::FieldModel;
-use crate::solution::FieldSolution;
+use crate::solution::FieldState;
 
 /// Places in a mesh that moves.
 #[derive(Clone, Debug)]
@@ -34,7 +34,7 @@ pub(crate) struct FixedPlaces {
 
 /// The field of a state at all of them, on one mesh.
 pub(crate) struct BlendedField<'a> {
-    state: (&'a FieldSolution, &'a FieldModel, &'a Mesh),
+    state: FieldState<'a>,
     points: Vec<BlendedPoint>,
     samples: Samples,
 }
@@ -97,7 +97,7 @@ impl FixedPlaces {
     /// As [`FixedPlaces::locate`].
     pub(crate) fn field<'a>(
         &self,
-        (solution, model, mesh): (&'a FieldSolution, &'a FieldModel, &'a Mesh),
+        (model, mesh, solution): FieldState<'a>,
     ) -> Result<BlendedField<'a>, SolverError> {
         let located = self.locate(model, mesh)?;
         let blend = |(located, (point, _)): (&Located, &(Point, ElementId))| {
@@ -115,7 +115,7 @@ impl FixedPlaces {
         };
         let values = elements.par_iter().flat_map_iter(of_element).collect();
         Ok(BlendedField {
-            state: (solution, model, mesh),
+            state: (model, mesh, solution),
             points,
             samples: Samples { rule, elements, values },
         })
@@ -198,7 +198,7 @@ impl BlendedField<'_> {
         q: &[Complex3],
         (by_potentials, by_positions): (&mut [c64], &mut [Point]),
     ) {
-        let topology = self.state.1.topology();
+        let topology = self.state.0.topology();
         let mut by_samples = vec![[c64::default(); 3]; self.samples.values.len()];
         for (point, q) in self.points.iter().zip(q) {
             let vertices = topology.tet(point.element);
@@ -235,7 +235,7 @@ impl BlendedField<'_> {
         q: &[Complex3],
         (by_potentials, by_positions): (&mut [c64], &mut [Point]),
     ) {
-        let (solution, model, mesh) = self.state;
+        let (model, mesh, solution) = self.state;
         let space = model.space();
         for (place, q) in q.iter().enumerate() {
             let (e, lambda) = self.samples.at(place);

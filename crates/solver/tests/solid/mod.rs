@@ -109,7 +109,7 @@ fn a_bar_is_a_coil_among_others() {
     for elements in ALL {
         let given = with_a_bar(&mesh, elements, 300.0, (100.0, NO_CIRCUIT));
         let (state, _) = given.solve(&mesh).expect("a field");
-        let found = terminals(&given, &mesh, &state).expect("terminals");
+        let found = terminals((&given, &mesh, &state)).expect("terminals");
         let [l, m] = [found.inductance[0][1], found.inductance[1][0]];
         println!("{elements:?}: {:?} M = {l:e}", found.coils[0]);
         assert!((l / m - 1.0).abs() < 1e-9, "{l} {m}");
@@ -130,7 +130,7 @@ fn a_bar_is_a_coil_among_others() {
             let winding = Winding { voltage: Some(source), ..series };
             let driven = with_a_bar(&mesh, elements, 300.0, (0.0, winding));
             let (state, _) = driven.solve(&mesh).expect("a field");
-            let seen = terminals(&driven, &mesh, &state).expect("terminals");
+            let seen = terminals((&driven, &mesh, &state)).expect("terminals");
             let (same, other) = (&seen.coils[0], &seen.coils[1]);
             let pairs = [
                 (bar.current, same.current),
@@ -157,7 +157,7 @@ fn at_rest_a_bar_has_the_resistance_of_its_section() {
         let winding = Winding { voltage: Some(c64::from(0.1)), resistance: 2.0 * resistance, ..NO_CIRCUIT };
         let model = with_a_bar(&mesh, elements, frequency, (0.0, winding));
         let (state, _) = model.solve(&mesh).expect("a field");
-        terminals(&model, &mesh, &state).expect("terminals")
+        terminals((&model, &mesh, &state)).expect("terminals")
     };
     for elements in ALL {
         let [rest, slow] = [0.0, 0.1].map(|frequency| of(elements, frequency));
@@ -245,7 +245,7 @@ fn a_closed_ring_is_two_halves_in_series() {
         // Nothing but the ring excites it: what is solved for are the responses.
         let report = state.report();
         assert!(report.iterations > 0 && report.residual > 0.0 && report.residual < 1e-12, "{report:?}");
-        let found = terminals(&model, &mesh, &state).expect("terminals");
+        let found = terminals((&model, &mesh, &state)).expect("terminals");
         let voltage = found.coils[0].voltage / 2.0;
         assert!((voltage - impedance(&found, omega)).norm() < 1e-9 * voltage.norm());
         (voltage, direct)
@@ -297,22 +297,22 @@ fn derivatives_match(model: &FieldModel, mesh: &Mesh, functionals: &[Functional]
     let (at, state, mut system) = solve(0.0);
     let sides = [solve(step), solve(-step)];
     for functional in functionals {
-        let value = functional.evaluate(model, &at, &state).expect("finite");
+        let value = functional.evaluate((model, &at, &state)).expect("finite");
         let mut gradient = value.explicit.unwrap_or_else(|| vec![[0.0; 3]; direction.len()]);
         let mut add = |own: Vec<Point>| {
             gradient.iter_mut().flatten().zip(own.as_flattened()).for_each(|(sum, own)| *sum += own)
         };
         if !value.derivative.is_empty() {
             let lambda = adjoint::solve(&mut system, &value.derivative).expect("an adjoint");
-            add(adjoint::node_gradient(model, &at, &state, &lambda, &moving).expect("one process"));
+            add(adjoint::node_gradient((model, &at, &state), &lambda, &moving).expect("one process"));
         }
-        let of_inductances = adjoint::inductance_gradient(model, &at, &state, &value.inductances, &moving);
+        let of_inductances = adjoint::inductance_gradient((model, &at, &state), &value.inductances, &moving);
         add(of_inductances.expect("one process"));
         let terms = gradient.iter().zip(&direction);
         let exact: f64 = terms.map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum();
         let [plus, minus] = sides
             .each_ref()
-            .map(|(mesh, state, _)| functional.evaluate(model, mesh, state).expect("finite").value);
+            .map(|(mesh, state, _)| functional.evaluate((model, mesh, state)).expect("finite").value);
         let difference = (plus - minus) / (2.0 * step);
         let elements = (model.setup().family, model.setup().order);
         println!("{elements:?}: {exact:e} {:e}", difference / exact - 1.0);
@@ -387,14 +387,14 @@ fn the_error_of_a_bar_is_estimated() {
         let functional = Functional::at_terminals(&coarse, "bar", AtTerminals::Voltage).expect("a winding");
         let value = |model: &FieldModel| {
             let (state, _) = model.solve(&mesh).expect("a field");
-            functional.evaluate(model, &mesh, &state).expect("finite").value
+            functional.evaluate((model, &mesh, &state)).expect("finite").value
         };
         let error = value(&of(Order::Quadratic)) - value(&coarse);
         let (state, _) = coarse.solve(&mesh).expect("a field");
         let fine = coarse.enriched(&mesh, Effort::Any).expect("a model");
         let mut enriched = Enrichment::new(&coarse, fine, (&mesh, &state), None).expect("a correction");
         let at = |enriched: &Enrichment, share: f64| {
-            functional.evaluate(enriched.model(), &mesh, &enriched.state(share)).expect("finite")
+            functional.evaluate((enriched.model(), &mesh, &enriched.state(share))).expect("finite")
         };
         let [before, half_way, after] = [0.0, 0.5, 1.0].map(|share| at(&enriched, share));
         let weighed = enriched.weigh(&coarse, &half_way.derivative).expect("a dual solution");
@@ -441,7 +441,7 @@ fn parts_of_a_conductor_are_in_series_or_in_parallel() {
             ..FieldModelSetup::default()
         };
         let (model, state) = solved(&mesh, setup);
-        terminals(&model, &mesh, &state).expect("terminals").coils
+        terminals((&model, &mesh, &state)).expect("terminals").coils
     };
     let topology = mesh.topology();
     let both: Vec<ElementId> =
@@ -478,7 +478,8 @@ fn load_cases_of_a_bar_are_those_of_models_of_their_own() {
     let driven = Winding { voltage: Some(volt), ..NO_CIRCUIT };
     let seen = |model: &FieldModel, state: &FieldSolution| {
         let of = |coil: CoilTerminals| [coil.current, coil.voltage];
-        terminals(model, &mesh, state).expect("terminals").coils.into_iter().flat_map(of).collect::<Vec<_>>()
+        let coils = terminals((model, &mesh, state)).expect("terminals").coils;
+        coils.into_iter().flat_map(of).collect::<Vec<_>>()
     };
     for frequency in [0.0, 300.0] {
         let first = with_a_bar(&mesh, ALL[2], frequency, (100.0, NO_CIRCUIT));

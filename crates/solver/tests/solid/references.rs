@@ -65,7 +65,7 @@ fn wire(elements: (ElementFamily, Order), skin_depth: f64, cells: usize) -> [c64
     };
     let omega = 2.0 * PI * setup.frequency;
     let (model, state) = solved(&mesh, setup);
-    let found = terminals(&model, &mesh, &state).expect("terminals");
+    let found = terminals((&model, &mesh, &state)).expect("terminals");
     let k = wave_number(skin_depth);
     let [j0, j1] = bessel(k * radius);
     let inside = k * j0 / (2.0 * PI * radius * COPPER * j1);
@@ -221,7 +221,7 @@ fn bars_by_elements([gap, width, half]: [f64; 3], is_pair: bool, hertz: f64, cel
         ..FieldModelSetup::default()
     };
     let (model, state) = solved(&mesh, setup);
-    let found = terminals(&model, &mesh, &state).expect("terminals");
+    let found = terminals((&model, &mesh, &state)).expect("terminals");
     impedance(&found, 2.0 * PI * hertz) / height
 }
 
@@ -275,7 +275,7 @@ fn what_a_voltage_drives_at_rest_is_that_of_the_order_of_an_estimate() {
     let coarse = of(Order::Linear);
     let linkage = |model: &FieldModel| {
         let (state, _) = model.solve(&mesh).expect("a field");
-        let found = terminals(model, &mesh, &state).expect("terminals");
+        let found = terminals((model, &mesh, &state)).expect("terminals");
         (found.coils[0].flux_linkage.re, found.coils[0].current.re)
     };
     let enriched = coarse.enriched(&mesh, Effort::Any).expect("a model");

@@ -47,7 +47,7 @@ const CURRENTS: [c64; 2] = [c64::new(240e3, 0.0), c64::new(-3600.0, 2400.0)];
 
 /// The voltages [V] of sources with which the bar and the winding have their currents in a state.
 fn voltages(model: &FieldModel, mesh: &Mesh, state: &FieldSolution) -> [c64; 2] {
-    let seen = terminals(model, mesh, state).expect("terminals");
+    let seen = terminals((model, mesh, state)).expect("terminals");
     [0, 1].map(|k| {
         let beyond = SERIES[k].impedance(model.angular_frequency()) - SERIES[k].resistance;
         seen.coils[k].voltage + beyond * seen.coils[k].current
@@ -66,7 +66,7 @@ fn a_straight_table_beside_circuits_is_the_linear_material() {
         for sources in &sources {
             let seen = [None, Some(straight.clone())].map(|curve| {
                 let (model, state) = crate::solved(&mesh, setup(&mesh, elements, (IRON, curve), *sources));
-                terminals(&model, &mesh, &state).expect("terminals").coils
+                terminals((&model, &mesh, &state)).expect("terminals").coils
             });
             for (a, b) in seen[0].iter().zip(&seen[1]) {
                 println!("{elements:?}: {a:?}");
@@ -94,7 +94,7 @@ fn what_is_short_circuited_beside_a_curve_has_a_state() {
             let (model, state) = crate::solved(&mesh, setup);
             println!("{shorted}: {} steps, {:.1e}", state.newton_steps(), state.report().residual);
             assert!(state.report().residual < 1e-10);
-            terminals(&model, &mesh, &state).expect("terminals").coils
+            terminals((&model, &mesh, &state)).expect("terminals").coils
         });
         let [linear, curved] = [&seen[0], &seen[1]].map(|coils| coils[shorted].current);
         let off = (linear - curved).norm() / linear.norm();
@@ -126,7 +126,7 @@ fn voltages_drive_the_currents_that_need_them_beside_saturated_iron() {
             let currents = std::array::from_fn(|k| if driven[k] { c64::default() } else { CURRENTS[k] });
             let sources = std::array::from_fn(|k| driven[k].then_some(needed[k]));
             let (model, state) = of((currents, sources));
-            let seen = terminals(&model, &mesh, &state).expect("terminals");
+            let seen = terminals((&model, &mesh, &state)).expect("terminals");
             for (coil, current) in seen.coils.iter().zip(CURRENTS) {
                 let off = (coil.current - current).norm() / current.norm();
                 println!("  {driven:?} {}: {off:.1e}, {} steps", coil.name, state.newton_steps());
@@ -143,7 +143,7 @@ fn a_capacitance_in_series_beside_saturated_iron_has_a_state() {
     let of = |setup| crate::solved(&mesh, setup);
     let iron = (IRON, Some(law()));
     let (given, state) = of(setup(&mesh, ALL[2], iron.clone(), (CURRENTS, [None; 2])));
-    let seen = &terminals(&given, &mesh, &state).expect("terminals").coils[1];
+    let seen = &terminals((&given, &mesh, &state)).expect("terminals").coils[1];
     let omega = given.angular_frequency();
     let reactance = omega * (seen.flux_linkage / seen.current).re;
     for share in [0.3, 0.9, 1.0, 1.1, 3.0] {
@@ -153,7 +153,7 @@ fn a_capacitance_in_series_beside_saturated_iron_has_a_state() {
         let series = Winding { series_capacitance: Some(capacitance), ..SERIES[1] };
         driven.windings[1] = Some(Winding { voltage: Some(voltage), ..series });
         let (model, state) = of(driven);
-        let found = &terminals(&model, &mesh, &state).expect("terminals").coils[1];
+        let found = &terminals((&model, &mesh, &state)).expect("terminals").coils[1];
         let source = found.voltage + (series.impedance(omega) - series.resistance) * found.current;
         println!("{share}: {} steps, {} for {} A", state.newton_steps(), found.current, seen.current);
         assert!(

@@ -34,7 +34,7 @@ fn weight(problem: &Problem, growth: f64) -> f64 {
     let mesh = problem.moved(&initial(problem)).expect("the initial design has a mesh").mesh;
     let state = model.solve(&mesh).expect("a sound case").0;
     let functional = &problem.objective().expect("an objective").terms[0].functional;
-    let derivative = functional.evaluate(model, &mesh, &state).expect("a sound case").derivative;
+    let derivative = functional.evaluate((model, &mesh, &state)).expect("a sound case").derivative;
     LARGEST_NORM / (norm::<c64>(&derivative) * growth.sqrt())
 }
 
