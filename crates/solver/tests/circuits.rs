@@ -1,5 +1,4 @@
-//! Coils as parts of circuits: inductances against filaments, voltages against currents, and the gradient of what a voltage
-//! drives.
+//! Coils as parts of circuits: inductances against filaments, voltages against currents.
 
 use std::f64::consts::PI;
 
@@ -13,7 +12,7 @@ use fluxmorph_solver::functional::{Follow, MirrorPlane, Multipoles};
 use fluxmorph_solver::material::VACUUM_PERMEABILITY;
 use fluxmorph_solver::multipole::{Expansion, Harmonic};
 use fluxmorph_solver::{
-    ElementFamily, FieldModel, FieldModelSetup, Functional, Material, OpenRegion, Order, Winding, adjoint,
+    ElementFamily, FieldModel, FieldModelSetup, Functional, Material, OpenRegion, Order, Winding,
 };
 
 use super::{NO_CIRCUIT, coarse_shield, flux_parallel, over_a_plate};
@@ -289,59 +288,4 @@ fn a_voltage_drives_the_current_that_needs_it() {
     assert!((power / (losses[1] + wire) - 1.0).abs() < 1e-7, "{power} {losses:?} {wire}");
     let resistance = by_voltage.resistance.expect("all is linear");
     assert!((resistance / (2.0 * (losses[1] + wire) / by_voltage.current.norm_sqr()) - 1.0).abs() < 1e-7);
-}
-
-/// The loss at a fixed voltage: the current follows the shape, and the gradient knows.
-#[test]
-fn the_gradient_at_a_fixed_voltage_matches_central_differences() {
-    let mesh = coarse_shield();
-    let winding = Winding { turns: 50.0, resistance: 0.02, voltage: Some(c64::new(3.0, 1.0)), ..NO_CIRCUIT };
-    let model = wound_over_a_plate(&mesh, winding, 0.0);
-    let region = mesh.topology().region("plate").expect("the plate");
-    let mut moving: Vec<_> = mesh
-        .topology()
-        .elements_of(region)
-        .into_iter()
-        .flat_map(|e| mesh.topology().tet(e))
-        .flat_map(|n| mesh.topology().elements_around(n).iter().copied())
-        .collect();
-    moving.sort_unstable();
-    moving.dedup();
-    // The plate's nodes sway; those on the symmetry planes stay on them.
-    let inside = |n: fluxmorph_geometry::NodeId| {
-        mesh.topology().elements_around(n).iter().any(|e| mesh.topology().region_of()[e.index()] == region)
-    };
-    let direction: Vec<Point> = mesh
-        .topology()
-        .nodes()
-        .map(|n| {
-            let [x, y, z] = mesh.point(n);
-            let sway = if inside(n) {
-                (20.0 * x + 1.0).sin() * (13.0 * y + 2.0).cos() * (1.0 + 30.0 * z)
-            } else {
-                0.0
-            };
-            [0.0, 0.0, sway]
-        })
-        .collect();
-    let loss = Functional::loss(&model, "plate").expect("it conducts");
-    let at = |step: f64| {
-        let moved: Vec<Point> = direction.iter().map(|v| v.map(|c| step * c)).collect();
-        let mesh = mesh.moved(&moved).expect("small");
-        let (state, system) = model.solve(&mesh).expect("it is solved");
-        let value = loss.evaluate((&model, &mesh, &state)).expect("finite");
-        (mesh, state, system, value)
-    };
-    let (mesh_0, state, mut system, value) = at(0.0);
-    let adjoint_state = adjoint::solve(&mut system, &value.derivative).expect("it is solved");
-    let field =
-        adjoint::node_gradient((&model, &mesh_0, &state), &adjoint_state, &moving).expect("in one process");
-    let explicit = value.explicit.expect("the plate moves");
-    let exact: f64 = (0..direction.len())
-        .map(|n| (0..3).map(|d| (field[n][d] + explicit[n][d]) * direction[n][d]).sum::<f64>())
-        .sum();
-    // A hundredth of a millimetre: the truncation of the difference is below 1e-6, the solver's error over it too.
-    let h = 1e-5;
-    let difference = (at(h).3.value - at(-h).3.value) / (2.0 * h);
-    assert!((difference / exact - 1.0).abs() < 1e-5, "{difference} {exact}");
 }

@@ -21,10 +21,11 @@ mod two_level;
 
 use fluxmorph_geometry::generate::{Grid, ShieldParameters, shield};
 use fluxmorph_geometry::tet4::Point;
-use fluxmorph_geometry::{Mesh, RegionId};
+use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::coil::{Coil, Corner, Racetrack, Terminal};
 use fluxmorph_solver::{
-    Boundary, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Material, Order, Winding,
+    Boundary, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, Order,
+    Winding, adjoint,
 };
 
 /// Both families in both orders.
@@ -103,6 +104,57 @@ fn solved(mesh: &Mesh, setup: FieldModelSetup) -> (FieldModel, FieldSolution) {
     let model = FieldModel::new(mesh, setup).expect("a sound problem");
     let (solution, _) = model.solve(mesh).expect("it is solved");
     (model, solution)
+}
+
+/// The mesh in a motion of its nodes, by so many of it.
+fn displaced(mesh: &Mesh, direction: &[Point], step: f64) -> Mesh {
+    let moved: Vec<Point> = direction.iter().map(|v| v.map(|c| step * c)).collect();
+    mesh.moved(&moved).expect("small")
+}
+
+/// The derivatives of functionals along a motion are those of central differences, with the elements that move and the step.
+fn derivatives_match(
+    model: &FieldModel,
+    mesh: &Mesh,
+    functionals: &[Functional],
+    (moving, direction, step): (&[ElementId], &[Point], f64),
+) {
+    let solve = |step: f64| {
+        let mesh = displaced(mesh, direction, step);
+        let (mut state, mut system) = model.solve(&mesh).expect("a field");
+        if model.is_linear() {
+            model.respond_to_every_winding(&mut system, &mut state).expect("responses");
+        }
+        (mesh, state, system)
+    };
+    let (at, state, mut system) = solve(0.0);
+    let sides = [solve(step), solve(-step)];
+    for (k, functional) in functionals.iter().enumerate() {
+        let value = functional.evaluate(model, &at, &state).expect("finite");
+        let mut gradient = value.explicit.unwrap_or_else(|| vec![[0.0; 3]; direction.len()]);
+        let mut add = |own: Vec<Point>| {
+            gradient.iter_mut().flatten().zip(own.as_flattened()).for_each(|(sum, own)| *sum += own)
+        };
+        if !value.derivative.is_empty() {
+            let lambda = adjoint::solve(&mut system, &value.derivative).expect("an adjoint");
+            add(adjoint::node_gradient(model, &at, &state, &lambda, moving).expect("one process"));
+        }
+        let of_inductances = adjoint::inductance_gradient(model, &at, &state, &value.inductances, moving);
+        add(of_inductances.expect("one process"));
+        let terms = gradient.iter().zip(direction);
+        let exact: f64 = terms.map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum();
+        let [plus, minus] = sides
+            .each_ref()
+            .map(|(mesh, state, _)| functional.evaluate(model, mesh, state).expect("finite").value);
+        let difference = (plus - minus) / (2.0 * step);
+        let elements = (model.setup().family, model.setup().order);
+        println!("{elements:?} {k}: {exact:e} {:e}", difference / exact - 1.0);
+        // Truncation by the square of a step of some micrometres on cells of millimetres; rounding of the solver over the step.
+        assert!(
+            (difference / exact - 1.0).abs() < 1e-6,
+            "{elements:?}, functional {k}: {difference} {exact}"
+        );
+    }
 }
 
 /// A surface of a mesh as a terminal of a coil.

@@ -16,10 +16,11 @@ use fluxmorph_solver::functional::{AtTerminals, Inductive};
 use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::{
     Drive, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, Order, Winding,
-    adjoint,
 };
 
-use super::{ALL, NO_CIRCUIT, OUTSIDE, flux_parallel, painted, solved, terminal};
+use super::{
+    ALL, NO_CIRCUIT, OUTSIDE, derivatives_match, displaced, flux_parallel, painted, solved, terminal,
+};
 
 /// Conductivity [S/m] of copper.
 const COPPER: f64 = 58e6;
@@ -276,55 +277,11 @@ fn sway(mesh: &Mesh) -> (Vec<ElementId>, Vec<Point>) {
     (moving, direction)
 }
 
-/// The box in a motion, by so many of it.
-fn swayed(mesh: &Mesh, direction: &[Point], step: f64) -> Mesh {
-    let moved: Vec<Point> = direction.iter().map(|v| v.map(|c| step * c)).collect();
-    mesh.moved(&moved).expect("small")
-}
-
-/// The derivatives of functionals of a model of the box along its motion are those of central differences.
-fn derivatives_match(model: &FieldModel, mesh: &Mesh, functionals: &[Functional]) {
-    let (moving, direction) = sway(mesh);
-    let solve = |step: f64| {
-        let mesh = swayed(mesh, &direction, step);
-        let (mut state, mut system) = model.solve(&mesh).expect("a field");
-        if model.is_linear() {
-            model.respond_to_every_winding(&mut system, &mut state).expect("responses");
-        }
-        (mesh, state, system)
-    };
-    let step = 1e-6;
-    let (at, state, mut system) = solve(0.0);
-    let sides = [solve(step), solve(-step)];
-    for functional in functionals {
-        let value = functional.evaluate((model, &at, &state)).expect("finite");
-        let mut gradient = value.explicit.unwrap_or_else(|| vec![[0.0; 3]; direction.len()]);
-        let mut add = |own: Vec<Point>| {
-            gradient.iter_mut().flatten().zip(own.as_flattened()).for_each(|(sum, own)| *sum += own)
-        };
-        if !value.derivative.is_empty() {
-            let lambda = adjoint::solve(&mut system, &value.derivative).expect("an adjoint");
-            add(adjoint::node_gradient((model, &at, &state), &lambda, &moving).expect("one process"));
-        }
-        let of_inductances = adjoint::inductance_gradient((model, &at, &state), &value.inductances, &moving);
-        add(of_inductances.expect("one process"));
-        let terms = gradient.iter().zip(&direction);
-        let exact: f64 = terms.map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum();
-        let [plus, minus] = sides
-            .each_ref()
-            .map(|(mesh, state, _)| functional.evaluate((model, mesh, state)).expect("finite").value);
-        let difference = (plus - minus) / (2.0 * step);
-        let elements = (model.setup().family, model.setup().order);
-        println!("{elements:?}: {exact:e} {:e}", difference / exact - 1.0);
-        // Truncation by the square of a step of some micrometres on cells of 5 mm; rounding of the solver over the step.
-        assert!((difference / exact - 1.0).abs() < 1e-6, "{elements:?}: {difference} {exact}");
-    }
-}
-
 /// The loss in the bar, its resistance, voltage and current follow its own surface, in both families and orders.
 #[test]
 fn the_gradient_of_a_bar_that_moves_matches_central_differences() {
     let mesh = bar_in_a_box();
+    let motion = sway(&mesh);
     for elements in ALL {
         let winding = Winding {
             voltage: Some(c64::new(0.02, 0.01)),
@@ -347,10 +304,9 @@ fn the_gradient_of_a_bar_that_moves_matches_central_differences() {
             functionals.push(Functional::at_terminals(&model, "bar", last).expect("a winding"));
             if elements.1 == Order::Linear {
                 // A model on a mesh that has moved finds the conductor's walls connected still.
-                let (_, direction) = sway(&mesh);
-                model.enriched(&swayed(&mesh, &direction, 1e-6), Effort::Any).expect("a sound problem");
+                model.enriched(&displaced(&mesh, &motion.1, 1e-6), Effort::Any).expect("a sound problem");
             }
-            derivatives_match(&model, &mesh, &functionals);
+            derivatives_match(&model, &mesh, &functionals, (&motion.0, &motion.1, 1e-6));
         }
     }
 }
