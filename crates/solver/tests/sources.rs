@@ -1,6 +1,6 @@
 //! Coils in a field model: where they may meet the outside of the mesh, and two descriptions of one coil.
 
-use crate::{OUTSIDE, flux_parallel, painted, terminal};
+use crate::{ALL, OUTSIDE, flux_parallel, painted, terminal};
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::fem::c64;
 use fluxmorph_geometry::generate::{ShieldParameters, shield};
@@ -22,8 +22,6 @@ fn model(x_min: Boundary, centre_z: f64) -> Result<FieldModel, SolverError> {
     boundaries.push(("x_min".to_owned(), x_min));
     let setup = FieldModelSetup {
         family: ElementFamily::Nodal,
-        frequency: 0.0,
-        penalty: 1.0,
         materials: vec![Material::AIR; mesh.topology().region_names().len()],
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns: c64::new(1.0, 0.0), shape: shape.into() }],
         boundaries,
@@ -71,8 +69,6 @@ fn solved(mesh: &Mesh, shape: CoilShape, ampere_turns: c64) -> Result<[c64; 3], 
     boundaries.push(("z_min".to_owned(), Boundary::FluxNormal));
     let setup = FieldModelSetup {
         family: ElementFamily::Nodal,
-        frequency: 0.0,
-        penalty: 1.0,
         materials: vec![Material::AIR; 2],
         coils: vec![Coil { name: "coil".to_owned(), ampere_turns, shape }],
         boundaries,
@@ -184,12 +180,7 @@ fn no_value_at_a_point_is_mixed_with_those_across_the_face_of_a_winding() {
     let density = current / (thickness * 0.04);
     let at_face = 0.5 * VACUUM_PERMEABILITY * density * thickness;
     let points = [0.003, 0.017, 0.0199, 0.022, 0.027, 0.033, 0.041, 0.055].map(|x| [x, 0.018, 0.023]);
-    for (family, order) in [
-        (ElementFamily::Nodal, Order::Linear),
-        (ElementFamily::Nodal, Order::Quadratic),
-        (ElementFamily::Edge, Order::Linear),
-        (ElementFamily::Edge, Order::Quadratic),
-    ] {
+    for (family, order) in ALL {
         let coil = Coil {
             name: "sheet".to_owned(),
             ampere_turns: c64::new(current, 0.0),
@@ -198,7 +189,6 @@ fn no_value_at_a_point_is_mixed_with_those_across_the_face_of_a_winding() {
         let setup = FieldModelSetup {
             family,
             order,
-            frequency: 0.0,
             materials: vec![Material::AIR; 2],
             coils: vec![coil],
             boundaries: boundaries.clone(),

@@ -77,8 +77,6 @@ fn model(mesh: &Mesh, corner: Corner) -> FieldModel {
     let boundaries = parallel.into_iter().chain([("z_min", Boundary::FluxNormal)]);
     let setup = FieldModelSetup {
         family: ElementFamily::Nodal,
-        frequency: 0.0,
-        penalty: 1.0,
         materials: vec![Material::AIR],
         coils: vec![Coil {
             name: "coil".to_owned(),

@@ -76,7 +76,6 @@ impl Slab {
         let setup = FieldModelSetup {
             family: ElementFamily::Nodal,
             frequency: self.frequency,
-            penalty: 1.0,
             materials: vec![Material::AIR, self.material],
             conductors,
             boundaries: faces.map(|(name, kind)| (name.to_owned(), kind)).to_vec(),
