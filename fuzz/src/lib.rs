@@ -4,6 +4,8 @@
 pub mod journal;
 pub mod mesh;
 pub mod mutation;
+#[cfg(feature = "optimizer")]
+pub mod quantity;
 
 use std::time::Duration;
 

@@ -1,4 +1,6 @@
 //! Gmsh files whose header is right, and what must hold for a mesh that was read from one.
+//!
+//! The tests of the geometry include this file: it uses nothing else of this crate.
 
 use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::io::{MshEncoding, msh_bytes, read_msh};
@@ -64,7 +66,11 @@ fn check(mesh: &Mesh) {
     assert!(topology.region_of().iter().all(|region| region.index() < topology.region_names().len()));
 }
 
-fn check_same(a: &Mesh, b: &Mesh) {
+/// Asserts that two meshes agree to the bit, up to the order in which triangles of a surface are listed.
+///
+/// # Panics
+/// If they do not.
+pub fn check_same(a: &Mesh, b: &Mesh) {
     let bits = |mesh: &Mesh| -> Vec<u64> { mesh.points().iter().flatten().map(|x| x.to_bits()).collect() };
     assert_eq!(bits(a), bits(b));
     let (a, b) = (a.topology(), b.topology());

@@ -13,6 +13,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::{Index, select};
 
+use crate::quantity::measure;
 use crate::sound::assert_reads_back;
 use crate::support::repository;
 
@@ -156,20 +157,6 @@ proptest! {
         changes in vec(change(), 1..5),
     ) {
         read(&changes.iter().fold(text, |text, change| change.apply(text)));
-    }
-}
-
-/// Reads a text as every dimension; what is accepted must be finite, and the same when it is written in SI.
-fn measure(text: &str) {
-    for dimension in Dimension::ALL {
-        match parse_quantity(text, dimension) {
-            Ok(value) => {
-                assert!(value.is_finite(), "{text}: {value}");
-                let again = parse_quantity(&format!("{value:e} {}", dimension.si_unit()), dimension);
-                assert_eq!(again.map(f64::to_bits), Ok(value.to_bits()), "{text}");
-            }
-            Err(error) => assert!(!error.to_string().is_empty(), "{text}"),
-        }
     }
 }
 

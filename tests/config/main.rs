@@ -21,6 +21,9 @@ mod meshes;
 mod msh_support;
 mod places;
 mod program;
+#[path = "../../fuzz/src/quantity.rs"]
+#[allow(unreachable_pub, reason = "the fuzz target shares it")]
+mod quantity;
 mod samples;
 mod sound;
 #[path = "../support/mod.rs"]

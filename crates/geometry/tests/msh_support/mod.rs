@@ -1,6 +1,6 @@
 //! Gmsh files of random meshes in every form that is read, written here without the library's own writer.
 
-#![allow(dead_code, reason = "every test binary uses its part")]
+#![allow(dead_code, unreachable_pub, reason = "every binary uses its part; the fuzz targets share theirs")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -8,6 +8,10 @@ use std::sync::Arc;
 use fluxmorph_geometry::generate::{BlockParameters, block};
 use fluxmorph_geometry::tet4::{FACES, Point, volume};
 use fluxmorph_geometry::{Mesh, NodeId, RegionId, Topology};
+
+#[path = "../../../../fuzz/src/mesh.rs"]
+pub(crate) mod fuzzed;
+pub(crate) use fuzzed::Form;
 
 /// A small deterministic source of numbers (splitmix64, Steele et al. 2014).
 pub(crate) struct Random(pub(crate) u64);
@@ -28,14 +32,6 @@ impl Random {
     pub(crate) fn unit(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
-}
-
-/// How a file is written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Form {
-    Ascii,
-    Little,
-    Big,
 }
 
 /// The versions.
@@ -278,11 +274,7 @@ impl Writer {
 
     pub(crate) fn header(&mut self, version: Version) {
         let version = if version == Version::V2 { "2.2" } else { "4.1" };
-        self.line(&format!("$MeshFormat\n{version} {} 8", u8::from(self.form != Form::Ascii)));
-        if self.form != Form::Ascii {
-            self.ints(&[1]);
-        }
-        self.end_section("MeshFormat");
+        self.bytes.extend(fuzzed::with_header(version, self.form, &[]));
     }
 
     fn number<const N: usize>(&mut self, text: String, little: [u8; N]) {
