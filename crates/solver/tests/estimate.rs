@@ -14,7 +14,7 @@ use fluxmorph_solver::{
 use crate::{in_the_square, solved, square};
 
 /// The value of a functional, its estimated error, and what all elements add to that.
-fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f64; 3] {
+pub(crate) fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f64; 3] {
     let (coarse, state) = solved(mesh, setup.clone());
     let value = functional.evaluate((&coarse, mesh, &state)).expect("a number").value;
     let fine = coarse.enriched(mesh, Effort::Any).expect("a sound problem");
@@ -31,7 +31,7 @@ fn estimate(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> [f
     [value, error, weighed.by_element.iter().sum()]
 }
 
-fn value(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> f64 {
+pub(crate) fn value(mesh: &Mesh, setup: &FieldModelSetup, functional: &Functional) -> f64 {
     let (model, state) = solved(mesh, setup.clone());
     functional.evaluate((&model, mesh, &state)).expect("a number").value
 }

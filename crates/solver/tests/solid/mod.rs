@@ -11,13 +11,14 @@ use fluxmorph_geometry::tet4::{Point, centroid, volume};
 use fluxmorph_geometry::{ElementId, Mesh, RegionId};
 use fluxmorph_solver::circuit::{CoilTerminals, Terminals, terminals};
 use fluxmorph_solver::coil::{Coil, Connection, Frame, Path, RegionCurrent, SolidConductor};
-use fluxmorph_solver::enrichment::{Effort, Enrichment};
+use fluxmorph_solver::enrichment::Effort;
 use fluxmorph_solver::functional::{AtTerminals, Inductive};
 use fluxmorph_solver::linear::LinearSolverSettings;
 use fluxmorph_solver::{
     Drive, ElementFamily, FieldModel, FieldModelSetup, FieldSolution, Functional, Material, Order, Winding,
 };
 
+use super::estimate::{estimate, value};
 use super::{
     ALL, NO_CIRCUIT, OUTSIDE, derivatives_match, displaced, flux_parallel, painted, solved, terminal,
 };
@@ -338,23 +339,11 @@ fn the_net_current_passes_every_section() {
 fn the_error_of_a_bar_is_estimated() {
     let mesh = bar_in_a_box();
     for family in [ElementFamily::Edge, ElementFamily::Nodal] {
-        let of = |order| with_a_bar(&mesh, (family, order), 300.0, (100.0, NO_CIRCUIT));
-        let coarse = of(Order::Linear);
-        let functional = Functional::at_terminals(&coarse, "bar", AtTerminals::Voltage).expect("a winding");
-        let value = |model: &FieldModel| {
-            let (state, _) = model.solve(&mesh).expect("a field");
-            functional.evaluate((model, &mesh, &state)).expect("finite").value
-        };
-        let error = value(&of(Order::Quadratic)) - value(&coarse);
-        let (state, _) = coarse.solve(&mesh).expect("a field");
-        let fine = coarse.enriched(&mesh, Effort::Any).expect("a model");
-        let mut enriched = Enrichment::new(&coarse, fine, (&mesh, &state), None).expect("a correction");
-        let at = |enriched: &Enrichment, share: f64| {
-            functional.evaluate((enriched.model(), &mesh, &enriched.state(share))).expect("finite")
-        };
-        let [before, half_way, after] = [0.0, 0.5, 1.0].map(|share| at(&enriched, share));
-        let weighed = enriched.weigh(&coarse, &half_way.derivative).expect("a dual solution");
-        let estimated = after.value - before.value + weighed.remainder;
+        let of = |order| setup_with_a_bar(&mesh, (family, order), 300.0, (100.0, NO_CIRCUIT));
+        let model = with_a_bar(&mesh, (family, Order::Linear), 300.0, (100.0, NO_CIRCUIT));
+        let functional = Functional::at_terminals(&model, "bar", AtTerminals::Voltage).expect("a winding");
+        let [coarse, estimated, _] = estimate(&mesh, &of(Order::Linear), &functional);
+        let error = value(&mesh, &of(Order::Quadratic), &functional) - coarse;
         println!("{family:?}: {estimated:e} of {error:e}");
         // Both corrections are solved for to a thousandth.
         assert!((estimated / error - 1.0).abs() < 0.01, "{family:?}: {estimated} {error}");
