@@ -131,32 +131,8 @@ fn integrate<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::differences::{SKEW, derivatives_hold};
+    use super::super::differences::SKEW;
     use super::*;
-
-    const REMANENCE: Point = [0.4, -0.2, 0.9];
-
-    #[test]
-    fn the_derivatives_of_the_energy_match_central_differences() {
-        derivatives_hold::<4, 4>(SKEW, |x, u| {
-            let density = squared_deviation(0.7, REMANENCE);
-            flux_integral(Lagrange::<4, 4>::tet(), &Tet4::new(x), &NodalField::new(u), density)
-        });
-        derivatives_hold::<10, 4>(SKEW, |x, u| {
-            let density = squared_deviation(0.7, REMANENCE);
-            flux_integral(Lagrange::<10, 4>::tet(), &Tet4::new(x), &NodalField::new(u), density)
-        });
-    }
-
-    #[test]
-    fn the_derivatives_of_the_eddy_loss_match_central_differences() {
-        derivatives_hold::<4, 4>(SKEW, |x, u| {
-            eddy_loss(Lagrange::<4, 4>::tet(), &Tet4::new(x), 1.3, &NodalField::new(u))
-        });
-        derivatives_hold::<10, 4>(SKEW, |x, u| {
-            eddy_loss(Lagrange::<10, 4>::tet(), &Tet4::new(x), 1.3, &NodalField::new(u))
-        });
-    }
 
     #[test]
     fn a_uniform_field_has_the_energy_of_its_volume() {

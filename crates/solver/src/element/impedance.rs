@@ -168,27 +168,9 @@ pub fn loss<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::differences::{assert_shape_derivative, bilinear, derivatives_hold, values};
     use super::*;
 
     const TRIANGLE: [Point; 3] = [[0.1, 0.0, 0.2], [1.1, 0.3, 0.0], [0.2, 0.8, 0.5]];
-
-    fn check<const N: usize>(shape: &'static Lagrange<N, 3>) {
-        let (l, u, coefficient) = (values::<N, 4>(5), values::<N, 4>(60), c64::new(0.7, 0.7));
-        let value = |vertices: [Point; 3]| {
-            let triangle = ImpedanceTriangle::new(shape, vertices, coefficient);
-            bilinear(&l, |a, b| triangle.block(a, b), &u)
-        };
-        let exact = shape_derivative(shape, TRIANGLE, coefficient, &l, &u);
-        assert_shape_derivative([1e-5, 1e-8], TRIANGLE, value, &exact);
-        derivatives_hold::<N, 3>(TRIANGLE, |x, u| loss(shape, x, 0.9, &u));
-    }
-
-    #[test]
-    fn the_derivatives_match_central_differences() {
-        check(Lagrange::<3, 3>::triangle());
-        check(Lagrange::<6, 3>::triangle());
-    }
 
     /// `A = ∇χ` and `ψ = −χ` carry no current, whatever lies across the surface.
     #[test]

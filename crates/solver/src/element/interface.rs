@@ -95,7 +95,7 @@ pub fn shape_derivative<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::differences::{SKEW, assert_shape_derivative, bilinear, values};
+    use super::super::differences::SKEW;
     use super::super::lagrange::TRIANGLE_EDGES;
 
     use super::*;
@@ -155,22 +155,5 @@ mod tests {
             let [m0, m1, m2] = TRIANGLE_EDGES.map(middle);
             [face[0], face[1], face[2], m0, m1, m2]
         });
-    }
-
-    fn check_derivative<const N: usize>(shape: &'static Lagrange<N, 3>) {
-        let (l, u) = (values(3), values(31));
-        let value = |vertices: [Point; 3]| {
-            let triangle = InterfaceTriangle::new(shape, vertices, 1.3);
-            bilinear(&l, |a, b| triangle.block(a, b), &u)
-        };
-        // Linear in each coordinate: exact at any step.
-        let exact = shape_derivative(shape, 1.3, &l, &u);
-        assert_shape_derivative([0.5, 1e-13], [SKEW[0], SKEW[1], SKEW[2]], value, &exact);
-    }
-
-    #[test]
-    fn the_shape_derivative_matches_central_differences() {
-        check_derivative(Lagrange::<3, 3>::triangle());
-        check_derivative(Lagrange::<6, 3>::triangle());
     }
 }

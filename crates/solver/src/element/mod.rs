@@ -14,7 +14,7 @@
 
 pub mod density;
 #[cfg(test)]
-mod differences;
+pub(crate) mod differences;
 pub(crate) mod edge;
 pub mod impedance;
 pub mod interface;

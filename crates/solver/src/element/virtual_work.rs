@@ -80,69 +80,58 @@ impl VirtualWork {
 mod tests {
     use fluxmorph_geometry::fem::c64;
 
-    use super::super::density::{ElementIntegral, flux_integral, squared_deviation};
+    use super::super::density::squared_deviation;
     use super::super::differences::{SKEW, central_difference, derivatives_hold, values};
-    use super::super::edge::{Ascending, EdgeShape};
-    use super::super::lagrange::Lagrange;
-    use super::super::volume::NodalField;
     use super::*;
+    use crate::family::{Cell, EDGE_1, EDGE_2, LocalIntegral, Matrices, NODAL_1, NODAL_2};
 
     const VELOCITIES: [Point; 4] = [[0.4, -0.2, 0.7], [0.1, 0.9, -0.5], [-0.3, 0.2, 0.6], [0.8, -0.7, 0.1]];
 
-    /// The work by an integral over `B`.
-    fn work<const N: usize>(
+    fn cell(vertices: [Point; 4]) -> Cell {
+        Cell { tet: Tet4::new(vertices), order: [1, 3, 0, 2] }
+    }
+
+    /// The work on a field, and its derivatives by the velocities.
+    fn work<const N: usize, const F: usize>(
+        family: &impl Matrices<N, F>,
         vertices: [Point; 4],
-        integral: impl FnOnce(&Tet4, &mut dyn FnMut(Complex3) -> OfFlux) -> ElementIntegral<N, 4>,
-    ) -> (ElementIntegral<N, 4>, [Point; 4]) {
-        let tet = Tet4::new(vertices);
-        let mut work = VirtualWork::new(&tet, 0.7, &VELOCITIES);
-        let mut rate = integral(&tet, &mut |b| work.density(b));
-        let [by_positions, by_velocities] = work.at_vertices(&tet);
+        field: &[[c64; 4]; N],
+    ) -> (LocalIntegral<4>, [Point; 4]) {
+        let cell = cell(vertices);
+        let mut work = VirtualWork::new(&cell.tet, 0.7, &VELOCITIES);
+        let mut rate = family.flux_integral(&cell, field, &mut |b| work.density(b));
+        let [by_positions, by_velocities] = work.at_vertices(&cell.tet);
         for (position, more) in rate.positions.iter_mut().zip(by_positions) {
             (0..3).for_each(|d| position[d] += more[d]);
         }
         (rate, by_velocities)
     }
 
-    fn check_derivatives<const N: usize>(
-        work: impl Fn([Point; 4], [[c64; 4]; N]) -> (ElementIntegral<N, 4>, [Point; 4]),
-    ) {
-        derivatives_hold::<N, 4>(SKEW, |x, u| work(x, u).0);
-        let (rate, by_velocities) = work(SKEW, values(5));
+    fn check_derivatives<const N: usize, const F: usize>(family: &impl Matrices<N, F>) {
+        derivatives_hold::<N, 4>(SKEW, |x, u| work(family, x, &u).0);
+        let (rate, by_velocities) = work(family, SKEW, &values(5));
         let along: f64 = (0..4).map(|k| fluxmorph_geometry::tet4::dot(by_velocities[k], VELOCITIES[k])).sum();
         assert!((along - rate.value).abs() < 1e-12 * rate.value.abs(), "it is linear in the velocities");
     }
 
-    fn of_nodal<const N: usize>(shape: &'static Lagrange<N, 4>) {
-        check_derivatives(|x, u| {
-            work(x, |tet, density| flux_integral(shape, tet, &NodalField::new(u), density))
-        });
-    }
-
-    fn of_edge<const N: usize, const M: usize>(shape: &'static EdgeShape<N, M>) {
-        let ascending = |tet: &Tet4| Ascending::new(tet, [1, 3, 0, 2]);
-        let of = |x, u: [[c64; 4]; N]| {
-            work(x, |tet, density| shape.flux_integral((tet, &ascending(tet)), &u, density))
-        };
-        check_derivatives(of);
+    fn check_rate<const N: usize, const F: usize>(family: &impl Matrices<N, F>) {
         let field: [[c64; 4]; N] = values(5);
         let energy = |t: f64| {
             let moved = |k: usize| std::array::from_fn(|d| SKEW[k][d] + t * VELOCITIES[k][d]);
-            let tet = Tet4::new(std::array::from_fn(moved));
-            shape
-                .flux_integral((&tet, &ascending(&tet)), &field, squared_deviation(0.7, [0.0; 3]))
-                .value
-                .into()
+            let cell = cell(std::array::from_fn(moved));
+            family.flux_integral(&cell, &field, &mut squared_deviation(0.7, [0.0; 3])).value.into()
         };
-        let (rate, difference) = (of(SKEW, field).0.value, central_difference(1e-5, energy).re);
+        let (rate, difference) = (work(family, SKEW, &field).0.value, central_difference(1e-5, energy).re);
         assert!((difference - rate).abs() < 1e-8 * (1.0 + rate.abs()), "{difference} {rate}");
     }
 
     #[test]
     fn the_work_has_the_derivatives_of_differences_and_is_the_rate_of_the_energy_on_edge_elements() {
-        of_nodal(Lagrange::<4, 4>::tet());
-        of_nodal(Lagrange::<10, 4>::tet());
-        of_edge(EdgeShape::<6, 12>::tet());
-        of_edge(EdgeShape::<10, 30>::tet());
+        check_derivatives(&*NODAL_1);
+        check_derivatives(&*NODAL_2);
+        check_derivatives(&*EDGE_1);
+        check_derivatives(&*EDGE_2);
+        check_rate(&*EDGE_1);
+        check_rate(&*EDGE_2);
     }
 }

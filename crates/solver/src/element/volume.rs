@@ -135,25 +135,6 @@ mod tests {
     }
 
     #[test]
-    fn an_element_of_air_is_given_by_its_scalars() {
-        let law = Coefficients { reluctivity: 1.7, extra_penalty: 0.0, eddy: c64::default() };
-        let matrix = AphiTet::new(Tet4::new(SKEW), law);
-        let scalars = matrix.scalars().expect("nothing couples components");
-        for (a, b) in (0..4).flat_map(|a| (a..4).map(move |b| (a, b))) {
-            let block = matrix.block(a, b);
-            for (i, j) in (0..4).flat_map(|i| (0..4).map(move |j| (i, j))) {
-                let expected = if i == j && i < 3 { scalars[a][b] } else { 0.0 };
-                assert!((block[i][j] - expected).norm() < 1e-15);
-            }
-        }
-        let conducting = Coefficients { eddy: LAW.eddy, ..law };
-        assert!(AphiTet::new(Tet4::new(SKEW), conducting).scalars().is_none());
-        assert!(
-            AphiTet::new(Tet4::new(SKEW), Coefficients { extra_penalty: 0.1, ..law }).scalars().is_none()
-        );
-    }
-
-    #[test]
     fn a_gradient_field_with_opposite_potential_carries_no_current() {
         // ψ linear and A = −∇ψ constant: E = 0, so the eddy part of K u vanishes.
         let slope = [0.3, -0.7, 0.9];

@@ -6,6 +6,8 @@
 //! functions in [`crate::element`]. Assembly, which needs the matrices of all elements, is generic instead
 //! (`Matrices`).
 
+#[cfg(test)]
+mod derivatives;
 mod edge;
 mod nodal;
 

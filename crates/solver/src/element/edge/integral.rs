@@ -97,31 +97,3 @@ impl<const N: usize, const M: usize> EdgeShape<N, M> {
         integral
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::super::density::squared_deviation;
-    use super::super::super::differences::{SKEW, derivatives_hold};
-    use super::*;
-
-    fn check<const N: usize, const M: usize>(shape: &'static EdgeShape<N, M>) {
-        let cell = |vertices: [Point; 4]| {
-            let tet = Tet4::new(vertices);
-            (tet, Ascending::new(&tet, [1, 3, 0, 2]))
-        };
-        derivatives_hold::<N, 4>(SKEW, |x, u| {
-            let (plain, tet) = cell(x);
-            shape.flux_integral((&plain, &tet), &u, squared_deviation(0.7, [0.4, -0.2, 0.9]))
-        });
-        derivatives_hold::<N, 4>(SKEW, |x, u| {
-            let (plain, tet) = cell(x);
-            shape.eddy_loss((&plain, &tet), 1.3, &u)
-        });
-    }
-
-    #[test]
-    fn derivatives_match_central_differences() {
-        check(EdgeShape::<6, 12>::tet());
-        check(EdgeShape::<10, 30>::tet());
-    }
-}

@@ -126,30 +126,12 @@ impl<const N: usize, const M: usize> EdgeTriangleShape<N, M> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::differences::{assert_shape_derivative, bilinear, derivatives_hold, values};
-    use super::super::super::impedance::surface_coefficient;
+    use super::super::super::differences::values;
     use super::super::{Ascending, EdgeShape};
     use super::*;
     use fluxmorph_geometry::tet4::{Tet4, area_vector, norm};
 
     const TRIANGLE: [Point; 3] = [[0.1, 0.0, 0.2], [1.1, 0.3, 0.0], [0.2, 0.8, 0.5]];
-
-    fn check<const N: usize, const M: usize>(shape: &'static EdgeTriangleShape<N, M>) {
-        let (l, u, coefficient) = (values::<N, 4>(5), values::<N, 4>(60), surface_coefficient(2.0, 3.0, 0.5));
-        let value = |vertices: [Point; 3]| {
-            let matrix = shape.matrix(vertices, coefficient);
-            bilinear(&l, |a, b| matrix.block(a, b), &u)
-        };
-        let exact = shape.shape_derivative(TRIANGLE, coefficient, &l, &u);
-        assert_shape_derivative([1e-5, 1e-8], TRIANGLE, value, &exact);
-        derivatives_hold::<N, 3>(TRIANGLE, |x, u| shape.loss(x, 0.9, &u));
-    }
-
-    #[test]
-    fn derivatives_match_central_differences() {
-        check(EdgeTriangleShape::<3, 6>::triangle());
-        check(EdgeTriangleShape::<4, 12>::triangle());
-    }
 
     /// The functions of a tetrahedron on its face are those of the triangle: `∫_S |A_t|²` by points of both.
     fn agrees<const N: usize, const M: usize, const F: usize, const K: usize>(
