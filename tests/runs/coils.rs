@@ -181,11 +181,9 @@ generator = "boxes"
 [mesh.boxes]
 box = [["0 mm", "0 mm", "0 mm"], ["60 mm", "60 mm", "20 mm"]]
 growth = 1.8
-
-[[mesh.boxes.regions]]
-name = "bar"
-box = [["20 mm", "20 mm", "0 mm"], ["30 mm", "30 mm", "20 mm"]]
-size = ["5 mm", "5 mm", "20 mm"]
+regions = [
+    { name = "bar", box = [["20 mm", "20 mm", "0 mm"], ["30 mm", "30 mm", "20 mm"]], size = ["5 mm", "5 mm", "20 mm"] },
+]
 
 [analysis]
 elements = "edge"
@@ -281,14 +279,10 @@ generator = "boxes"
 [mesh.boxes]
 box = [["-20 mm", "-20 mm", "-15 mm"], ["30 mm", "30 mm", "20 mm"]]
 growth = 2
-[[mesh.boxes.regions]]
-name = "bend"
-box = [["0 mm", "0 mm", "0 mm"], ["30 mm", "10 mm", "5 mm"]]
-size = "5 mm"
-[[mesh.boxes.regions]]
-name = "bend"
-box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "30 mm", "5 mm"]]
-size = "5 mm"
+regions = [
+    { name = "bend", box = [["0 mm", "0 mm", "0 mm"], ["30 mm", "10 mm", "5 mm"]], size = "5 mm" },
+    { name = "bend", box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "30 mm", "5 mm"]], size = "5 mm" },
+]
 [analysis]
 frequency = 0
 [materials.copper]

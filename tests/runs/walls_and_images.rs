@@ -83,11 +83,7 @@ generator = "boxes"
 
 [mesh.boxes]
 box = [["0 mm", "0 mm", "0 mm"], ["400 mm", "400 mm", "5 mm"]]
-
-[[mesh.boxes.regions]]
-name = "core"
-box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "10 mm", "5 mm"]]
-size = ["5 mm", "5 mm", "5 mm"]
+regions = [{ name = "core", box = [["0 mm", "0 mm", "0 mm"], ["10 mm", "10 mm", "5 mm"]], size = ["5 mm", "5 mm", "5 mm"] }]
 
 [analysis]
 frequency = 0

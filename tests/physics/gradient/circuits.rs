@@ -12,8 +12,7 @@ const BUSBAR: &str = include_str!("../../../configs/busbar.toml");
 
 /// A bound on a kind of one coil or a pair, whatever its value.
 fn bound(kind: &str, coils: &str, number: usize) -> String {
-    let name = format!("{kind}_{number}");
-    format!("[[constraints]]\nname = \"{name}\"\nkind = \"{kind}\"\ncoils = [{coils}]\nlower = 1e-20\n")
+    format!("{{ name = \"{kind}_{number}\", kind = \"{kind}\", coils = [{coils}], lower = 1e-20 }},\n")
 }
 
 /// Every kind that has a meaning at rest.
@@ -25,30 +24,10 @@ fn static_kinds() -> String {
 
 /// Terms of the field above the coils.
 const TERMS: &str = r#"
-[[constraints]]
-name = "dipole"
-kind = "multipole"
-region = "circle"
-harmonics = ["b1"]
-lower = 1e-20
-[[constraints]]
-name = "content"
-kind = "multipole_content"
-region = "circle"
-harmonics = ["a2", "b3"]
-upper = 1
-[[constraints]]
-name = "slope"
-kind = "multipole"
-region = "ball"
-harmonics = ["c1_0"]
-upper = 1
-[[constraints]]
-name = "ball_content"
-kind = "multipole_content"
-region = "ball"
-harmonics = ["c1_0", "c2_0", "c2_2"]
-upper = 1
+    { name = "dipole", kind = "multipole", region = "circle", harmonics = ["b1"], lower = 1e-20 },
+    { name = "content", kind = "multipole_content", region = "circle", harmonics = ["a2", "b3"], upper = 1 },
+    { name = "slope", kind = "multipole", region = "ball", harmonics = ["c1_0"], upper = 1 },
+    { name = "ball_content", kind = "multipole_content", region = "ball", harmonics = ["c1_0", "c2_0", "c2_2"], upper = 1 },
 "#;
 
 /// Every other kind.
@@ -60,8 +39,7 @@ fn harmonic_kinds() -> String {
 
 /// The coils with constraints and changes.
 fn problem(constraints: &str, changes: &[(&str, &str)]) -> Problem {
-    let design = format!("{constraints}[design]");
-    setup_of(&changed(COILS, &[&[("[design]", design.as_str())], changes].concat())).problem
+    setup_of(&format!("constraints = [{constraints}]\n{}", changed(COILS, changes))).problem
 }
 
 #[test]
@@ -104,7 +82,7 @@ fn currents_that_voltages_drive_follow_the_shape() {
     let of_one = ["current", "voltage", "flux_linkage", "power", "power_factor"];
     let mut kinds: String = of_one.iter().map(|kind| bound(kind, "\"one\"", 1)).collect();
     kinds += &bound("current", "\"two\"", 2);
-    kinds += "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper_ratio = 2\n";
+    kinds += r#"{ kind = "loss", region = "plate", upper_ratio = 2 }"#;
     all_hold_on(&problem(&kinds, &driven), uneven);
 }
 
@@ -128,17 +106,22 @@ fn what_moves_in_the_window_of_a_coil_is_exact() {
     all_hold_on(&with(&kinds, &driven), uneven);
 }
 
+/// The constraint of the busbar, and one of its loss.
+const OF_BAR: &str = r#"
+    { kind = "volume", region = "bar", upper_ratio = 1.0 },
+    { kind = "loss", region = "bar", upper_ratio = 2 },
+"#;
+
 /// A busbar whose own face moves: what it is as a coil, at a current and at a voltage.
 #[test]
 fn what_a_solid_conductor_is_follows_its_own_face() {
     let of = |kinds: &[&str], changes: &[(&str, &str)]| {
-        let mut kinds: String = kinds.iter().map(|kind| bound(kind, "\"bar\"", 1)).collect();
-        kinds += "[[constraints]]\nkind = \"loss\"\nregion = \"bar\"\nupper_ratio = 2\n";
-        let design = format!("{kinds}[design]\n");
+        let kinds: String = kinds.iter().map(|kind| bound(kind, "\"bar\"", 1)).collect();
         let order = ("order = 2", "order = 1\nlinear_solver = { tolerance = 1e-13 }");
         let coarse = ("size = [\"2 mm\", \"2 mm\", \"4 mm\"]", "size = [\"4 mm\", \"4 mm\", \"4 mm\"]");
-        let changes = [&[("[design]\n", design.as_str()), order, coarse], changes].concat();
-        setup_of(&changed(BUSBAR, &changes)).problem
+        let own = ("[[constraints]]\nkind = \"volume\"\nregion = \"bar\"\nupper_ratio = 1.0\n", "");
+        let text = changed(BUSBAR, &[&[own, order, coarse], changes].concat());
+        setup_of(&format!("constraints = [{OF_BAR}{kinds}]\n{text}")).problem
     };
     all_hold_on(&of(&["inductance", "quality_factor", "voltage", "power", "power_factor"], &[]), uneven);
     let voltage = "voltage = \"2 mV\"\nresistance = \"0.001 mohm\"\nseries_inductance = \"1 nH\"";

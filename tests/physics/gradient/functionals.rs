@@ -11,13 +11,13 @@ use crate::problems::analysed;
 use crate::support::folder::read_text;
 use crate::support::shield::quick;
 
-/// The quick shield with another objective, constraints and overrides.
-fn problem(objective: &str, constraints: &str, frequency: &str, overrides: &[&str]) -> Problem {
+/// The quick shield with another objective, lists before its tables, and overrides.
+fn problem(objective: &str, lists: &str, frequency: &str, overrides: &[&str]) -> Problem {
     let text = read_text(&quick()).replace("frequency = \"60 Hz\"", frequency);
     let (start, rest) = text.split_once("[objective]").expect("it has an objective");
     let (_, end) = rest.split_once("[design]").expect("a design follows");
     let mut file = tempfile::Builder::new().suffix(".toml").tempfile().expect("a temporary file");
-    write!(file, "{start}[objective]\n{objective}\n{constraints}\n[design]{end}").expect("written");
+    write!(file, "{lists}\n{start}[objective]\n{objective}\n[design]{end}").expect("written");
     let overrides: Vec<String> = overrides.iter().map(|o| (*o).to_owned()).collect();
     let (config, source) = Config::from_file(file.path(), &overrides).unwrap_or_else(|e| panic!("{e}"));
     set_up(&config, &source, Mode::Optimisation).unwrap_or_else(|e| panic!("{e}")).problem
@@ -25,40 +25,17 @@ fn problem(objective: &str, constraints: &str, frequency: &str, overrides: &[&st
 
 /// Constraints on what does not need eddy currents.
 const FIELD: &str = r#"
-[[constraints]]
-kind = "target_field"
-region = "observation"
-target = ["0 T", "1 mT", "5 mT"]
-upper_ratio = 0.9
-[[constraints]]
-kind = "field_component"
-region = "observation"
-direction = [0.2, -0.1, 1.0]
-upper = "1 T"
-[[constraints]]
-kind = "energy"
-upper = "1 kJ"
-[[constraints]]
-name = "energy_around"
-kind = "energy"
-region = "remesh"
-upper = "1 kJ"
+    { kind = "target_field", region = "observation", target = ["0 T", "1 mT", "5 mT"], upper_ratio = 0.9 },
+    { kind = "field_component", region = "observation", direction = [0.2, -0.1, 1.0], upper = "1 T" },
+    { kind = "energy", upper = "1 kJ" },
+    { name = "energy_around", kind = "energy", region = "remesh", upper = "1 kJ" },
 "#;
 
 /// Constraints on the loss and on the shape.
 const REST: &str = r#"
-[[constraints]]
-kind = "loss"
-region = "plate"
-upper = "1 kW"
-[[constraints]]
-kind = "volume"
-region = "plate"
-upper_ratio = 1.1
-[[constraints]]
-kind = "thickness"
-minimum = "8 mm"
-maximum = "15 mm"
+    { kind = "loss", region = "plate", upper = "1 kW" },
+    { kind = "volume", region = "plate", upper_ratio = 1.1 },
+    { kind = "thickness", minimum = "8 mm", maximum = "15 mm" },
 "#;
 
 const OBSERVED: &str = "region = \"observation\"";
@@ -67,46 +44,39 @@ const OBSERVED: &str = "region = \"observation\"";
 fn every_kind_is_exact_in_the_volume_model() {
     // The upper face of the plate follows the elastic body, and its thickness counts both.
     let free = [&MESHED[..], &["remesh.free=[\"plate_top\"]"]].concat();
-    all_hold_on(&problem(OBSERVED, &format!("{FIELD}{REST}"), "frequency = 60", &free), wavy);
+    all_hold_on(&problem(OBSERVED, &format!("constraints = [{FIELD}{REST}]"), "frequency = 60", &free), wavy);
 }
 
 #[test]
 fn every_kind_is_exact_in_the_impedance_model() {
-    all_hold_on(&problem(OBSERVED, &format!("{FIELD}{REST}"), "frequency = 60", &[]), wavy);
+    all_hold_on(&problem(OBSERVED, &format!("constraints = [{FIELD}{REST}]"), "frequency = 60", &[]), wavy);
 }
 
 #[test]
 fn every_kind_is_exact_in_statics() {
-    let inside =
-        "[[constraints]]\nkind = \"energy\"\nregion = \"plate\"\nname = \"inside\"\nupper = \"1 J\"\n";
+    let inside = r#"{ kind = "energy", region = "plate", name = "inside", upper = "1 J" }"#;
     // Nodal elements are refused beside iron in statics.
     let overrides = [&MESHED[..], &["analysis.elements=edge"]].concat();
-    all_hold_on(&problem(OBSERVED, &format!("{FIELD}{inside}"), "frequency = 0", &overrides), wavy);
+    all_hold_on(
+        &problem(OBSERVED, &format!("constraints = [{FIELD}{inside}]"), "frequency = 0", &overrides),
+        wavy,
+    );
 }
 
 /// Two frequencies; one term at each, one at both and one of the shape alone, with weights that make them alike in size.
 const SUM: &str = r#"goal = "maximise"
-[[objective.terms]]
-region = "observation"
-weight = -1e3
-[[objective.terms]]
-kind = "loss"
-region = "plate"
-frequency = "60 Hz"
-weight = -1e-2
-[[objective.terms]]
-kind = "energy"
-frequency = "200 Hz"
-weight = -0.1
-[[objective.terms]]
-kind = "volume"
-region = "plate"
-weight = -1e4
+terms = [
+    { region = "observation", weight = -1e3 },
+    { kind = "loss", region = "plate", frequency = "60 Hz", weight = -1e-2 },
+    { kind = "energy", frequency = "200 Hz", weight = -0.1 },
+    { kind = "volume", region = "plate", weight = -1e4 },
+]
 "#;
 
-const TWICE: &str = "[[constraints]]\nkind = \"loss\"\nregion = \"plate\"\nupper = \"1 kW\"\n\
-                     [[constraints]]\nkind = \"loss\"\nname = \"at_200\"\nregion = \"plate\"\nupper = \"1 kW\"\n\
-                     frequency = \"200 Hz\"\n";
+const TWICE: &str = r#"constraints = [
+    { kind = "loss", region = "plate", upper = "1 kW" },
+    { kind = "loss", name = "at_200", region = "plate", upper = "1 kW", frequency = "200 Hz" },
+]"#;
 
 #[test]
 fn sums_over_two_frequencies_are_exact() {
@@ -129,42 +99,16 @@ fn sums_over_two_frequencies_are_exact() {
 
 /// Observed where the mesh moves: cells that move along, and places that stay; an expansion there.
 const WHERE_IT_MOVES: &str = r#"
-[[multipoles]]
-name = "ball"
-shape = "ball"
-center = ["20 mm", "60 mm", "-46 mm"]
-radius = "8 mm"
-order = 2
-[[constraints]]
-kind = "flux_density_squared"
-region = "observation"
-weighting = "volume"
-follow = "mesh"
-upper_ratio = 0.9
-[[constraints]]
-kind = "homogeneity"
-region = "observation"
-compare = "modulus"
-follow = "mesh"
-upper_ratio = 2
-[[constraints]]
-kind = "homogeneity"
-name = "in_space"
-region = "observation"
-follow = "space"
-upper_ratio = 2
-[[constraints]]
-kind = "field_component"
-region = "observation"
-direction = [0.2, -0.1, 1.0]
-follow = "space"
-upper = "1 T"
-[[constraints]]
-kind = "multipole_content"
-region = "ball"
-harmonics = ["c1_0", "s2_1"]
-follow = "space"
-upper_ratio = 2
+multipoles = [
+    { name = "ball", shape = "ball", center = ["20 mm", "60 mm", "-46 mm"], radius = "8 mm", order = 2 },
+]
+constraints = [
+    { kind = "flux_density_squared", region = "observation", weighting = "volume", follow = "mesh", upper_ratio = 0.9 },
+    { kind = "homogeneity", region = "observation", compare = "modulus", follow = "mesh", upper_ratio = 2 },
+    { kind = "homogeneity", name = "in_space", region = "observation", follow = "space", upper_ratio = 2 },
+    { kind = "field_component", region = "observation", direction = [0.2, -0.1, 1.0], follow = "space", upper = "1 T" },
+    { kind = "multipole_content", region = "ball", harmonics = ["c1_0", "s2_1"], follow = "space", upper_ratio = 2 },
+]
 "#;
 
 #[test]

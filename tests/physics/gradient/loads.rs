@@ -15,74 +15,41 @@ const COUPLING: &str = "goal = \"maximise\"\nkind = \"coupling\"\ncoils = [\"one
 
 /// Two loads of one frequency and one of another.
 const LOADS: &str = r#"
-[[loads]]
-name = "both"
-[[loads]]
-name = "reversed"
-ampere_turns = { two = "-60 A" }
-phase = { two = "0 deg" }
-[[loads]]
-name = "fast"
-frequency = "500 Hz"
-amplitude = 0.5
-ampere_turns = { two = "0 A" }
+loads = [
+    { name = "both" },
+    { name = "reversed", ampere_turns = { two = "-60 A" }, phase = { two = "0 deg" } },
+    { name = "fast", frequency = "500 Hz", amplitude = 0.5, ampere_turns = { two = "0 A" } },
+]
 "#;
 
 /// Terms of some loads and of all.
 const TERMS: &str = r#"
-[[objective.terms]]
-kind = "loss"
-region = "plate"
-load = "reversed"
-weight = 2
-[[objective.terms]]
-kind = "energy"
-load = "both"
-weight = 100
-[[objective.terms]]
-kind = "flux_linkage"
-coils = ["two"]
-weight = 800
-[[objective.terms]]
-kind = "resistance"
-coils = ["one"]
-load = "fast"
+terms = [
+    { kind = "loss", region = "plate", load = "reversed", weight = 2 },
+    { kind = "energy", load = "both", weight = 100 },
+    { kind = "flux_linkage", coils = ["two"], weight = 800 },
+    { kind = "resistance", coils = ["one"], load = "fast" },
+]
 "#;
 
 /// Constraints of some loads and of all.
 const BOUNDS: &str = r#"
-[[constraints]]
-kind = "loss"
-region = "plate"
-upper_ratio = 2
-[[constraints]]
-name = "loss_fast"
-kind = "loss"
-region = "plate"
-load = "fast"
-upper_ratio = 2
-[[constraints]]
-kind = "voltage"
-coils = ["one"]
-load = "reversed"
-upper_ratio = 2
-[[constraints]]
-kind = "coupling"
-coils = ["one", "two"]
-load = "reversed"
-upper = 1
+constraints = [
+    { kind = "loss", region = "plate", upper_ratio = 2 },
+    { name = "loss_fast", kind = "loss", region = "plate", load = "fast", upper_ratio = 2 },
+    { kind = "voltage", coils = ["one"], load = "reversed", upper_ratio = 2 },
+    { kind = "coupling", coils = ["one", "two"], load = "reversed", upper = 1 },
+]
 "#;
 
-/// The device with an objective, and with tables before its design.
-fn problem(objective: &str, tables: &str, changes: &[(&str, &str)]) -> Problem {
-    let tables = format!("{tables}[design]");
-    let own = [(COUPLING, objective), ("[design]", tables.as_str())];
-    setup_of(&changed(COILS, &[&own[..], changes].concat())).problem
+/// The device with an objective, and with lists before its tables.
+fn problem(objective: &str, lists: &str) -> Problem {
+    setup_of(&format!("{lists}{}", changed(COILS, &[(COUPLING, objective)]))).problem
 }
 
 #[test]
 fn sums_over_loads_and_quantities_of_one_are_exact() {
-    let problem = problem(TERMS, &format!("{LOADS}{BOUNDS}"), &[]);
+    let problem = problem(TERMS, &format!("{LOADS}{BOUNDS}"));
     assert_eq!(problem.states().len(), 3);
     let states = problem.states();
     assert!(states[0].shares_matrix_with(&states[1]) && !states[0].shares_matrix_with(&states[2]));
@@ -101,7 +68,7 @@ fn worse_of_two(weight: f64) -> Problem {
         "combine = \"worst_case\"\n[[objective.terms]]\nkind = \"loss\"\nregion = \"plate\"\nload = \"both\"\n\
          [[objective.terms]]\nkind = \"loss\"\nregion = \"plate\"\nload = \"fast\"\nweight = {weight:e}\n"
     );
-    problem(&terms, LOADS, &[])
+    problem(&terms, LOADS)
 }
 
 /// Where two terms are equal the worst of them has a kink, and what is certified is the one whose gradient is taken.
@@ -133,7 +100,7 @@ fn the_worst_of_loads_has_the_gradient_of_that_load() {
 #[test]
 fn a_worst_case_is_over_all_loads() {
     let terms = "combine = \"worst_case\"\nkind = \"loss\"\nregion = \"plate\"\n";
-    let problem = problem(terms, LOADS, &[]);
+    let problem = problem(terms, LOADS);
     let labels = problem.objective().expect("an objective").terms.iter();
     let loads: Vec<&str> = labels.filter_map(|term| term.label.load.as_deref()).collect();
     assert_eq!(loads, ["both", "reversed", "fast"]);
@@ -141,58 +108,35 @@ fn a_worst_case_is_over_all_loads() {
 
 /// An open secondary under one load, short-circuited under the other, while voltage or current drives the primary: the circuits
 /// on the shared matrix are others under each.
-const DRIVEN: &str = r#"
-[[loads]]
-name = "open"
-voltage = { one = "1 V" }
-ampere_turns = { two = "0 A" }
-[[loads]]
-name = "short"
-voltage = { two = "0 V" }
-[[loads]]
-name = "both"
-voltage = { one = "2 V", two = "1 V" }
-phase = { two = "60 deg" }
-"#;
+const DRIVEN: [&str; 3] = [
+    r#"{ name = "open", voltage = { one = "1 V" }, ampere_turns = { two = "0 A" } }"#,
+    r#"{ name = "short", voltage = { two = "0 V" } }"#,
+    r#"{ name = "both", voltage = { one = "2 V", two = "1 V" }, phase = { two = "60 deg" } }"#,
+];
 
-const OF_DRIVEN: &str = r#"
-[[constraints]]
-kind = "current"
-coils = ["one"]
-load = "open"
-upper_ratio = 2
-[[constraints]]
-kind = "current"
-coils = ["two"]
-load = "short"
-upper_ratio = 2
-[[constraints]]
-kind = "power"
-coils = ["one"]
-load = "both"
-upper_ratio = 2
-[[constraints]]
-kind = "voltage"
-coils = ["two"]
-load = "open"
-upper_ratio = 2
-"#;
+/// What is bounded, each under the load of that place.
+const OF_DRIVEN: [(usize, &str); 4] = [
+    (0, r#"{ kind = "current", coils = ["one"], load = "open", upper_ratio = 2 }"#),
+    (1, r#"{ kind = "current", coils = ["two"], load = "short", upper_ratio = 2 }"#),
+    (2, r#"{ kind = "power", coils = ["one"], load = "both", upper_ratio = 2 }"#),
+    (0, r#"{ kind = "voltage", coils = ["two"], load = "open", upper_ratio = 2 }"#),
+];
 
 #[test]
 fn loads_that_voltages_drive_are_exact_and_those_of_each_alone() {
-    let loss = "kind = \"loss\"\nregion = \"plate\"\n";
-    let together = problem(loss, &format!("{DRIVEN}{OF_DRIVEN}"), &[]);
+    let of = |loads: &str, bounds: &str| {
+        let lists = format!("loads = [{loads}]\nconstraints = [{bounds}]\n");
+        problem("kind = \"loss\"\nregion = \"plate\"\n", &lists)
+    };
+    let together = of(&DRIVEN.join(", "), &OF_DRIVEN.map(|(_, bound)| bound).join(", "));
     let states = together.states();
     assert!(states[0].shares_matrix_with(&states[1]) && states[1].shares_matrix_with(&states[2]));
     let p = uneven(&together);
     let values: Vec<f64> = analysed(&together, &p).constraints.iter().map(|c| c.value).collect();
     // Each load as the only one of a device of its own.
-    let loads: Vec<&str> = DRIVEN.split("[[loads]]").skip(1).collect();
-    let bounds: Vec<&str> = OF_DRIVEN.split("[[constraints]]").skip(1).collect();
-    for (load, bound, value) in [(0, 0, values[0]), (1, 1, values[1]), (2, 2, values[2]), (0, 3, values[3])] {
-        let tables = format!("[[loads]]{}[[constraints]]{}", loads[load], bounds[bound]);
-        let alone = problem(loss, &tables, &[]);
-        let own = analysed(&alone, &p).constraints[0].value;
+    assert_eq!(values.len(), OF_DRIVEN.len());
+    for ((load, bound), value) in OF_DRIVEN.into_iter().zip(values) {
+        let own = analysed(&of(DRIVEN[load], bound), &p).constraints[0].value;
         println!("{own:e} {value:e}");
         // Both within the tolerance of the linear solver.
         assert!((own / value - 1.0).abs() < 1e-10, "{own:e} {value:e}");
@@ -204,16 +148,13 @@ fn loads_that_voltages_drive_are_exact_and_those_of_each_alone() {
 #[test]
 fn fields_under_loads_of_one_frequency_superpose() {
     let loads = r#"
-[[loads]]
-name = "both"
-[[loads]]
-name = "one"
-ampere_turns = { two = "0 A" }
-[[loads]]
-name = "two"
-ampere_turns = { one = "0 A" }
+loads = [
+    { name = "both" },
+    { name = "one", ampere_turns = { two = "0 A" } },
+    { name = "two", ampere_turns = { one = "0 A" } },
+]
 "#;
-    let problem = problem("kind = \"energy\"\n", loads, &[]);
+    let problem = problem("kind = \"energy\"\n", loads);
     let analysis = analysed(&problem, &uneven(&problem));
     let [both, one, two] = [0, 1, 2].map(|k| analysis.solutions[k].values());
     let size = both.iter().map(|u| u.norm_sqr()).sum::<f64>().sqrt();

@@ -41,27 +41,22 @@ fn magnet(elements: &str, order: u8) -> String {
     let permeability = if (elements, order) == ("nodal", 1) { 5 } else { 200 };
     format!(
         r#"
+        constraints = [
+            {{ kind = "energy", upper_ratio = 2 }},
+            {{ kind = "energy", name = "magnet_alone", region = "magnet", upper_ratio = 2 }},
+        ]
         [mesh]
         generator = "boxes"
         [mesh.boxes]
         box = [[0, 0, "-30 mm"], ["40 mm", "40 mm", "50 mm"]]
         growth = 2
-        [[mesh.boxes.regions]]
-        name = "gap"
-        box = [[0, 0, 0], ["20 mm", "20 mm", "10 mm"]]
-        size = "5 mm"
-        [[mesh.boxes.regions]]
-        name = "magnet"
-        box = [[0, 0, "10 mm"], ["10 mm", "10 mm", "20 mm"]]
-        [[mesh.boxes.regions]]
-        name = "around"
-        box = [["10 mm", 0, "10 mm"], ["20 mm", "20 mm", "20 mm"]]
-        [[mesh.boxes.regions]]
-        name = "iron"
-        box = [[0, 0, "-10 mm"], ["20 mm", "20 mm", 0]]
-        [[mesh.boxes.regions]]
-        name = "observation"
-        box = [[0, 0, "-20 mm"], ["20 mm", "20 mm", "-10 mm"]]
+        regions = [
+            {{ name = "gap", box = [[0, 0, 0], ["20 mm", "20 mm", "10 mm"]], size = "5 mm" }},
+            {{ name = "magnet", box = [[0, 0, "10 mm"], ["10 mm", "10 mm", "20 mm"]] }},
+            {{ name = "around", box = [["10 mm", 0, "10 mm"], ["20 mm", "20 mm", "20 mm"]] }},
+            {{ name = "iron", box = [[0, 0, "-10 mm"], ["20 mm", "20 mm", 0]] }},
+            {{ name = "observation", box = [[0, 0, "-20 mm"], ["20 mm", "20 mm", "-10 mm"]] }},
+        ]
         [analysis]
         frequency = 0
         elements = "{elements}"
@@ -82,14 +77,6 @@ fn magnet(elements: &str, order: u8) -> String {
         kind = "flux_density_squared"
         weighting = "volume"
         region = "observation"
-        [[constraints]]
-        kind = "energy"
-        upper_ratio = 2
-        [[constraints]]
-        kind = "energy"
-        name = "magnet_alone"
-        region = "magnet"
-        upper_ratio = 2
         [design]
         surface = "magnet|gap"
         direction = [0, 0, -1]
@@ -120,21 +107,22 @@ fn the_gradient_with_a_magnet_that_moves_is_exact() {
 
 /// A block of metal in a uniform field, whose upper face moves: every kind of function of the field.
 const APPLIED: &str = r#"
+    constraints = [
+        { kind = "field_component", region = "observation", direction = [1, 0, 2], upper_ratio = 2 },
+        { kind = "energy", upper_ratio = 2 },
+        { kind = "loss", region = "block", upper_ratio = 2 },
+        { kind = "mass", region = "block", upper_ratio = 2 },
+    ]
     [mesh]
     generator = "boxes"
     [mesh.boxes]
     box = [[0, 0, 0], ["40 mm", "40 mm", "40 mm"]]
     growth = 2
-    [[mesh.boxes.regions]]
-    name = "around"
-    box = [[0, 0, 0], ["15 mm", "15 mm", "15 mm"]]
-    size = "5 mm"
-    [[mesh.boxes.regions]]
-    name = "block"
-    box = [[0, 0, 0], ["10 mm", "10 mm", "10 mm"]]
-    [[mesh.boxes.regions]]
-    name = "observation"
-    box = [[0, 0, "20 mm"], ["10 mm", "10 mm", "25 mm"]]
+    regions = [
+        { name = "around", box = [[0, 0, 0], ["15 mm", "15 mm", "15 mm"]], size = "5 mm" },
+        { name = "block", box = [[0, 0, 0], ["10 mm", "10 mm", "10 mm"]] },
+        { name = "observation", box = [[0, 0, "20 mm"], ["10 mm", "10 mm", "25 mm"]] },
+    ]
     [analysis]
     frequency = "200 Hz"
     order = 2
@@ -153,22 +141,6 @@ const APPLIED: &str = r#"
     weighting = "volume"
     region = "observation"
     target = [0, 0, "0.12 T"]
-    [[constraints]]
-    kind = "field_component"
-    region = "observation"
-    direction = [1, 0, 2]
-    upper_ratio = 2
-    [[constraints]]
-    kind = "energy"
-    upper_ratio = 2
-    [[constraints]]
-    kind = "loss"
-    region = "block"
-    upper_ratio = 2
-    [[constraints]]
-    kind = "mass"
-    region = "block"
-    upper_ratio = 2
     [design]
     surface = "block|around"
     direction = "normal"
@@ -192,11 +164,8 @@ fn the_gradient_in_an_applied_field_is_exact_for_every_kind() {
 /// The same block beside a winding of the mesh, a bar from one flux-parallel wall to another.
 #[test]
 fn the_gradient_beside_a_coil_region_is_exact_for_every_kind() {
-    let winding = r#"[[mesh.boxes.regions]]
-    name = "winding"
-    box = [["25 mm", 0, 0], ["30 mm", "40 mm", "10 mm"]]
-    [[mesh.boxes.regions]]
-    name = "observation""#;
+    let winding = r#"{ name = "winding", box = [["25 mm", 0, 0], ["30 mm", "40 mm", "10 mm"]] },
+        { name = "observation""#;
     let walls = r#"flux_parallel = ["x_min", "x_max", "y_min", "y_max", "z_max"]
     flux_normal = ["z_min"]
     [[coils]]
@@ -207,9 +176,8 @@ fn the_gradient_beside_a_coil_region_is_exact_for_every_kind() {
     let applied = r#"flux_parallel = ["x_min", "y_min"]
     flux_normal = ["z_min"]
     uniform_field = { surfaces = ["x_max", "y_max", "z_max"], b = [0, 0, "0.1 T"] }"#;
-    let named = "[[mesh.boxes.regions]]\n    name = \"observation\"";
     for elements in ["elements = \"edge\"", "elements = \"edge\"\n    order = 2"] {
-        let changes = [("order = 2", elements), (named, winding), (applied, walls)];
+        let changes = [("order = 2", elements), (r#"{ name = "observation""#, winding), (applied, walls)];
         let setup = setup_of(&changed(APPLIED, &changes));
         let p: Vec<f64> = (0..variables(&setup.problem)).map(|k| 3e-4 * (1.3 * k as f64).sin()).collect();
         all_hold(&setup.problem, &p, &brief());

@@ -28,17 +28,11 @@ fn device(iron: &str, frequency: f64, more: &str) -> String {
         [mesh.boxes]
         box = [[0, 0, "-60 mm"], ["20 mm", "20 mm", "60 mm"]]
         growth = 2
-        [[mesh.boxes.regions]]
-        name = "iron"
-        box = [[0, 0, "-60 mm"], ["20 mm", "20 mm", "60 mm"]]
-        [[mesh.boxes.regions]]
-        name = "other"
-        box = [[0, 0, "20 mm"], ["20 mm", "20 mm", "40 mm"]]
-        size = "5 mm"
-        [[mesh.boxes.regions]]
-        name = "winding"
-        box = [[0, 0, "-10 mm"], ["20 mm", "20 mm", "10 mm"]]
-        size = "2 mm"
+        regions = [
+            {{ name = "iron", box = [[0, 0, "-60 mm"], ["20 mm", "20 mm", "60 mm"]] }},
+            {{ name = "other", box = [[0, 0, "20 mm"], ["20 mm", "20 mm", "40 mm"]], size = "5 mm" }},
+            {{ name = "winding", box = [[0, 0, "-10 mm"], ["20 mm", "20 mm", "10 mm"]], size = "2 mm" }},
+        ]
         [analysis]
         elements = "edge"
         frequency = {frequency}
