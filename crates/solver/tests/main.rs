@@ -130,22 +130,22 @@ fn derivatives_match(
     let (at, state, mut system) = solve(0.0);
     let sides = [solve(step), solve(-step)];
     for (k, functional) in functionals.iter().enumerate() {
-        let value = functional.evaluate(model, &at, &state).expect("finite");
+        let value = functional.evaluate((model, &at, &state)).expect("finite");
         let mut gradient = value.explicit.unwrap_or_else(|| vec![[0.0; 3]; direction.len()]);
         let mut add = |own: Vec<Point>| {
             gradient.iter_mut().flatten().zip(own.as_flattened()).for_each(|(sum, own)| *sum += own)
         };
         if !value.derivative.is_empty() {
             let lambda = adjoint::solve(&mut system, &value.derivative).expect("an adjoint");
-            add(adjoint::node_gradient(model, &at, &state, &lambda, moving).expect("one process"));
+            add(adjoint::node_gradient((model, &at, &state), &lambda, moving).expect("one process"));
         }
-        let of_inductances = adjoint::inductance_gradient(model, &at, &state, &value.inductances, moving);
+        let of_inductances = adjoint::inductance_gradient((model, &at, &state), &value.inductances, moving);
         add(of_inductances.expect("one process"));
         let terms = gradient.iter().zip(direction);
         let exact: f64 = terms.map(|(g, v)| (0..3).map(|d| g[d] * v[d]).sum::<f64>()).sum();
         let [plus, minus] = sides
             .each_ref()
-            .map(|(mesh, state, _)| functional.evaluate(model, mesh, state).expect("finite").value);
+            .map(|(mesh, state, _)| functional.evaluate((model, mesh, state)).expect("finite").value);
         let difference = (plus - minus) / (2.0 * step);
         let elements = (model.setup().family, model.setup().order);
         println!("{elements:?} {k}: {exact:e} {:e}", difference / exact - 1.0);
