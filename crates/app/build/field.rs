@@ -22,6 +22,7 @@ use fluxmorph_solver::{
 use super::curves::Curves;
 use super::entries::{material, solid_coil};
 use super::locate_error::DiagnosticSink;
+use super::soundness::nodes_of;
 use super::{loads, open};
 use crate::config::{
     self, Combination, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver,
@@ -60,10 +61,7 @@ pub(super) fn without_replaced_regions(
 /// The nodes that are left without the regions that their surfaces replace, ascending: those of the mesh that is solved on,
 /// in its order.
 pub(crate) fn remaining_nodes(config: &Config, full: &Topology) -> Vec<NodeId> {
-    let mut remains = vec![false; full.node_count()];
-    for e in remaining_elements(config, full) {
-        full.tet(e).iter().for_each(|n| remains[n.index()] = true);
-    }
+    let remains = nodes_of(full, remaining_elements(config, full));
     full.nodes().filter(|n| remains[n.index()]).collect()
 }
 

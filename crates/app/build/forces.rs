@@ -9,7 +9,7 @@ use fluxmorph_solver::coil;
 use super::entries::{is_magnet, is_wound, material};
 use super::plausible::{INCLINED, place_of_current, windings};
 use super::references::{body_of, functionals};
-use super::soundness::faces_of;
+use super::soundness::{faces_of, nodes_of};
 use crate::config::{Config, ForceBody, ObjectiveKind, RegionModel};
 
 /// Cosine of the angle (one degree) between normals of planes that count as parallel.
@@ -47,8 +47,14 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
              that on what lies beside it"
         ));
     }
-    let own: Vec<RegionId> = body.regions.iter().filter_map(|name| topology.region(name).ok()).collect();
-    let touches = |other: RegionId| own.iter().any(|&own| !topology.interface(own, other).is_empty());
+    // An edge or a corner in common will do: the layer in which a force is taken has all elements around the nodes of the body.
+    let is_of_body = nodes_of(topology, topology.elements().filter(is_own));
+    let touches = |other: RegionId| {
+        topology
+            .elements_of(other)
+            .iter()
+            .any(|&e| topology.tet(e).iter().any(|node| is_of_body[node.index()]))
+    };
     let mut outside = topology.region_names().iter().filter(|name| !body.regions.contains(name));
     let joined = outside.find(|name| is_iron(name.as_str()) && topology.region(name).is_ok_and(touches))?;
     Some(format!(

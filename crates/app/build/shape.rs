@@ -18,7 +18,7 @@ use super::entries::{is_air, material};
 use super::functional::FixedElements;
 use super::held::held_node_fault;
 use super::plausible;
-use super::soundness::unit_warning;
+use super::soundness::{nodes_of, unit_warning};
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
 
@@ -440,16 +440,27 @@ fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Dia
     })
 }
 
-/// That a region is part of the elastic body by the design surface alone, which no key of `[remesh]` says.
+/// That a region which is not in `remesh.region` moves by nodes in a surface alone: the design surface, or one in `remesh.free`.
 fn brought_in(inputs: &Inputs<'_>, region: &str) -> Option<String> {
-    let config::RemeshExtent::Regions(named) = &inputs.remesh.extent else { return None };
-    (!named.iter().any(|own| own == region)).then(|| {
-        format!(
-            "`{region}` moves because it touches the design surface `{}`, not by remesh.region: take another surface, or lay a region \
-             between it and what stays",
-            inputs.design.surface.join("`, `")
-        )
-    })
+    let Inputs { design, remesh, full_mesh, .. } = *inputs;
+    let config::RemeshExtent::Regions(named) = &remesh.extent else { return None };
+    if named.iter().any(|own| own == region) {
+        return None;
+    }
+    let topology = full_mesh.topology();
+    let is_in = nodes_of(topology, topology.elements_of(topology.region(region).ok()?));
+    let touches = |surface: &&String| {
+        let faces = topology.surface(surface);
+        faces.is_ok_and(|faces| faces.iter().flatten().any(|node| is_in[node.index()]))
+    };
+    let (what, surface) = match design.surface.iter().find(touches) {
+        Some(own) => ("the design surface", own),
+        None => ("a surface in remesh.free,", remesh.free.iter().find(touches)?),
+    };
+    Some(format!(
+        "`{region}` moves because it touches {what} `{surface}`, not by remesh.region: take another surface, or lay a region between it \
+         and what stays"
+    ))
 }
 
 /// The coil whose region an element is in.

@@ -248,7 +248,7 @@ impl Accuracy {
 
 /// Whether an initial value is next to nothing beside the best one, or has the other sign.
 fn begins_near_zero([initial, best]: [f64; 2]) -> bool {
-    best / initial <= 0.0 || initial.abs() < LEAST_START * best.abs()
+    best / initial < 0.0 || initial.abs() < LEAST_START * best.abs()
 }
 
 /// The size of an error relative to a value; `None` where that is no number.
@@ -261,7 +261,7 @@ impl Verdict {
     pub fn describe(self) -> &'static str {
         match self {
             Self::Confirmed => "confirmed: the gain is the shape's",
-            Self::NotConfirmed => "NOT CONFIRMED: the gain is the mesh's",
+            Self::NotConfirmed => "NOT CONFIRMED: the gain may be the mesh's",
         }
     }
 }
@@ -349,6 +349,11 @@ mod tests {
         assert_eq!(verdict(0.155, &[1.37]), Some(Verdict::NotConfirmed), "the pole of nodal elements");
         assert_eq!(verdict(2.0, &[1.6]), Some(Verdict::Confirmed));
         assert_eq!(verdict(2.0, &[1.4]), Some(Verdict::NotConfirmed));
+        assert_eq!(
+            verdict(0.0, &[0.99]),
+            Some(Verdict::NotConfirmed),
+            "of a best value of zero there is a ratio"
+        );
         assert_eq!(verdict(1.0, &[1.0]), None);
         assert_eq!(verdict(1.000_002_4, &[1.000_002]), None, "as much may be rounding");
         assert_eq!(verdict(0.5, &[]), None);

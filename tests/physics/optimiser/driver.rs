@@ -162,6 +162,44 @@ fn where_nothing_better_comes_of_the_design_of_a_coarser_mesh_the_initial_one_is
     }
 }
 
+/// A bar in a slot whose face comes to its upper bound, where the air above it is all but gone.
+const BAR: &str = r#"
+analysis = { frequency = "50 Hz", order = 2 }
+objective = { kind = "voltage", coils = ["bar"] }
+boundaries = { flux_parallel = ["z_min", "z_max", "y_max"] }
+remesh = { region = ["bar", "above"], slide = ["x_min", "x_max", "z_min", "z_max"] }
+design = { surface = "top", direction = [0, 1, 0], grid = [2, 2], lower = "-5 mm", upper = "30 mm" }
+materials = { copper = { conductivity = "58 MS/m" } }
+regions = { bar = { material = "copper" } }
+[mesh]
+generator = "boxes"
+[mesh.boxes]
+box = [[0, 0, 0], ["10 mm", "40 mm", "5 mm"]]
+regions = [
+    { name = "above", box = [[0, "8 mm", 0], ["10 mm", "40 mm", "5 mm"]], size = ["5 mm", "3 mm", "5 mm"] },
+    { name = "bar", box = [[0, 0, 0], ["10 mm", "8 mm", "5 mm"]], size = ["5 mm", "1 mm", "5 mm"] },
+]
+surfaces = [{ name = "top", box = [[0, "8 mm", 0], ["10 mm", "8 mm", "5 mm"]] }]
+[[coils]]
+name = "bar"
+region = "bar"
+conductor = "solid"
+ampere_turns = "1 kA"
+terminals = ["z_min", "z_max"]
+"#;
+
+#[test]
+fn a_design_that_its_bounds_hold_has_converged_however_little_room_its_mesh_has() {
+    for algorithm in [Algorithm::Mma, Algorithm::Slsqp] {
+        let mut problem = setup_of(BAR).problem;
+        let settings = Optimizer { algorithm, ..Optimizer::default() };
+        let (optimised, rows) = optimised(&mut problem, &settings, &mut Silent);
+        println!("{algorithm:?}: {:?} after {}", optimised.stop_reason, rows.len());
+        assert!(optimised.best.values.iter().all(|p| (p - 0.03).abs() < 1e-9), "{:?}", optimised.best.values);
+        assert!(optimised.stop_reason.is_converged(), "{algorithm:?}: {:?}", optimised.stop_reason);
+    }
+}
+
 /// The mesh that moves ends 15 mm below a face that would move by 20 mm.
 const LID: &str = "mesh.shield.remesh_z=[\"-25 mm\", \"30 mm\"]";
 

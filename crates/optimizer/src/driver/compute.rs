@@ -164,8 +164,8 @@ impl Run<'_> {
                 "the worst term of the initial design is zero: one of the loads or frequencies has no field there, or nothing of what is \
                  asked for, as there is no loss at 0 Hz; leave it out of the objective"
             } else {
-                "the objective of the initial design is zero: there is no field to change, its terms cancel, or it is the deviation \
-                 within a single element; check coils, regions, frequencies and weights"
+                "the objective of the initial design is zero: there is no field to change, its terms cancel, it is the deviation within \
+                 a single element, or this design is an optimum already; check coils, regions, frequencies and weights"
             };
             return Err(Error::Optimisation { cause });
         }

@@ -372,6 +372,11 @@ impl<'a> Run<'a> {
         self.least_promised().is_some_and(|least| least < HELD_TOLERANCES * self.settings.least_gain())
     }
 
+    /// Whether the gradient promises more at the best design than the tolerance of the objective, with what bounds and constraints leave.
+    pub(super) fn may_gain(&self) -> bool {
+        self.least_promised().is_none_or(|least| least > self.settings.least_gain())
+    }
+
     fn least_promised(&self) -> Option<f64> {
         let (best, shape) = (self.best.as_ref()?, self.shape());
         Some(least_promised_gain(&best.sample, &best.values, shape.lower(), shape.upper()))

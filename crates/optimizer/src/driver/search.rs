@@ -213,7 +213,7 @@ impl<'a> Search<'a> {
                 // At an optimum that bounds and constraints hold there is no step but rounding.
                 Ending::Roundoff if run.is_held() => StopReason::ObjectiveConverged,
                 Ending::Roundoff => StopReason::RoundoffLimited,
-                _ if run.is_held_back || self.is_throttled(run) => StopReason::MeshLimited,
+                _ if run.is_held_back && run.may_gain() || self.is_throttled(run) => StopReason::MeshLimited,
                 Ending::Objective | Ending::Entered => StopReason::ObjectiveConverged,
                 Ending::Step => StopReason::StepConverged,
             }),
