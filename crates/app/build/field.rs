@@ -22,7 +22,6 @@ use fluxmorph_solver::{
 use super::curves::Curves;
 use super::entries::{material, solid_coil};
 use super::locate_error::DiagnosticSink;
-use super::soundness::nodes_of;
 use super::{loads, open};
 use crate::config::{
     self, Combination, Config, Diagnostic, FactorReuse, PetscKrylov, PetscSolver, PetscSubSolver,
@@ -61,7 +60,7 @@ pub(super) fn without_replaced_regions(
 /// The nodes that are left without the regions that their surfaces replace, ascending: those of the mesh that is solved on,
 /// in its order.
 pub(crate) fn remaining_nodes(config: &Config, full: &Topology) -> Vec<NodeId> {
-    let remains = nodes_of(full, remaining_elements(config, full));
+    let remains = full.is_node_of(remaining_elements(config, full));
     full.nodes().filter(|n| remains[n.index()]).collect()
 }
 

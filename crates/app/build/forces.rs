@@ -9,7 +9,7 @@ use fluxmorph_solver::coil;
 use super::entries::{is_magnet, is_wound, material};
 use super::plausible::{INCLINED, place_of_current, windings};
 use super::references::{body_of, functionals};
-use super::soundness::{faces_of, nodes_of};
+use super::soundness::faces_of;
 use crate::config::{Config, ForceBody, ObjectiveKind, RegionModel};
 
 /// Cosine of the angle (one degree) between normals of planes that count as parallel.
@@ -48,7 +48,8 @@ fn force_warning(config: &Config, mesh: &Mesh, coils: &[coil::Coil], body: &Forc
         ));
     }
     // An edge or a corner in common will do: the layer in which a force is taken has all elements around the nodes of the body.
-    let is_of_body = nodes_of(topology, topology.elements().filter(is_own));
+    let own = body.regions.iter().filter_map(|name| topology.region(name).ok());
+    let is_of_body = topology.is_node_of(own.flat_map(|region| topology.elements_of(region)));
     let touches = |other: RegionId| {
         topology
             .elements_of(other)

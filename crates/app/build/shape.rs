@@ -18,7 +18,7 @@ use super::entries::{is_air, material};
 use super::functional::FixedElements;
 use super::held::held_node_fault;
 use super::plausible;
-use super::soundness::{nodes_of, unit_warning};
+use super::soundness::{faces_of, unit_warning};
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
 
@@ -401,8 +401,7 @@ fn overlap_faults(
         let message = format!("the shell of open space reaches into the remesh region, at {at}");
         let fault = source.diagnostic("open", message);
         let fault = fault.expected("a remesh region inside the shell, which does not move");
-        let region = mesh.topology().region_name_at(e);
-        faults.push(match brought_in(inputs, region) {
+        faults.push(match brought_in(inputs, e) {
             Some(cure) => fault.help(cure),
             None => fault,
         });
@@ -428,7 +427,7 @@ fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Dia
     let fault = fault.expected(
         "a remesh region without nodes of elements that a winding or an end of its window cuts: a coil does not move with the mesh",
     );
-    let cure = match brought_in(inputs, region) {
+    let cure = match brought_in(inputs, element) {
         Some(cure) => cure,
         None => "shrink the remesh region, or make what is in the coil's window a region of its own that stays; of a coil that is a \
                  region of the mesh only that has to stay"
@@ -440,22 +439,33 @@ fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Dia
     })
 }
 
-/// That a region which is not in `remesh.region` moves by nodes in a surface alone: the design surface, or one in `remesh.free`.
-fn brought_in(inputs: &Inputs<'_>, region: &str) -> Option<String> {
-    let Inputs { design, remesh, full_mesh, .. } = *inputs;
+/// That an element moves by a surface alone, not by `remesh.region`: its region has a face in the design surface, or it has a node there,
+/// or in a surface in which `[remesh]` lets nodes move.
+fn brought_in(inputs: &Inputs<'_>, element: ElementId) -> Option<String> {
+    let Inputs { design, remesh, mesh, .. } = *inputs;
+    let topology = mesh.topology();
+    let region = topology.region_name_at(element);
     let config::RemeshExtent::Regions(named) = &remesh.extent else { return None };
     if named.iter().any(|own| own == region) {
         return None;
     }
-    let topology = full_mesh.topology();
-    let is_in = nodes_of(topology, topology.elements_of(topology.region(region).ok()?));
-    let touches = |surface: &&String| {
+    let has_node_in = |surface: &String| {
         let faces = topology.surface(surface);
-        faces.is_ok_and(|faces| faces.iter().flatten().any(|node| is_in[node.index()]))
+        faces.is_ok_and(|faces| faces.iter().flatten().any(|node| topology.tet(element).contains(node)))
     };
-    let (what, surface) = match design.surface.iter().find(touches) {
-        Some(own) => ("the design surface", own),
-        None => ("a surface in remesh.free,", remesh.free.iter().find(touches)?),
+    let has_face_in = |surface: &String| {
+        let faces = faces_of(topology, [surface.as_str()]);
+        let is_at = |e: ElementId| topology.region_name_at(e) == region;
+        let mut facets = topology.facets().iter().filter(|facet| faces.contains(&face_key(facet.nodes)));
+        facets.any(|facet| is_at(facet.inside) || facet.outside.is_some_and(is_at))
+    };
+    let is_designed = |surface: &&String| has_face_in(surface) || has_node_in(surface);
+    let (what, surface) = if let Some(own) = design.surface.iter().find(is_designed) {
+        ("the design surface", own)
+    } else if let Some(own) = remesh.free.iter().find(|surface| has_node_in(surface)) {
+        ("a surface in remesh.free,", own)
+    } else {
+        ("a surface in remesh.slide,", remesh.slide.iter().find(|surface| has_node_in(surface))?)
     };
     Some(format!(
         "`{region}` moves because it touches {what} `{surface}`, not by remesh.region: take another surface, or lay a region between it \

@@ -11,7 +11,7 @@ use fluxmorph_geometry::soundness::{
 };
 use fluxmorph_geometry::tet4::{self, Point, area_vector, centroid, dot, norm, sub};
 use fluxmorph_geometry::topology::face_key;
-use fluxmorph_geometry::{ElementId, Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
+use fluxmorph_geometry::{Mesh, Millimetres, NodeId, RegionId, Topology, millimetres};
 
 use super::entries::material;
 use super::open;
@@ -190,13 +190,6 @@ pub(super) fn faces_of<'a>(
 ) -> HashSet<[NodeId; 3]> {
     let surfaces = names.into_iter().filter_map(|name| topology.surface(name).ok());
     surfaces.flatten().map(|nodes| face_key(*nodes)).collect()
-}
-
-/// Whether a node belongs to one of some elements, shape `(n_nodes,)`.
-pub(super) fn nodes_of(topology: &Topology, elements: impl IntoIterator<Item = ElementId>) -> Vec<bool> {
-    let mut is_in = vec![false; topology.node_count()];
-    elements.into_iter().flat_map(|e| topology.tet(e)).for_each(|node| is_in[node.index()] = true);
-    is_in
 }
 
 /// The unit normal of a face.

@@ -168,11 +168,11 @@ impl Accuracy {
     }
 
     /// Whether a gain that is confirmed, between the values of the initial and of the best design, is smaller than its error bar: as a
-    /// ratio, or where there is none in the unit of the objective.
+    /// ratio, or where it has no error bar in the unit of the objective.
     pub fn hides_gain(&self, own: [f64; 2]) -> bool {
         let [initial, best] = own;
         let hides = match self.error_estimate {
-            Some([first, last]) if !self.has_ratio(own) => {
+            Some([first, last]) if !self.has_ratio(own) || self.error_estimate_relative.is_none() => {
                 let error = (last - first).abs().max(UNCANCELLED * first.abs().max(last.abs()));
                 SAFETY * error >= (best - initial).abs()
             }
@@ -340,6 +340,7 @@ mod tests {
         assert!(!hidden([-3.9e-5, 2.498e-3], [3.1e-5, 4.2e-4]));
         assert!(hidden([-3.9e-5, 2.498e-3], [-1.3e-3, 4.2e-4]));
         assert!(hidden([1.0, 0.99], [-0.1, -0.11]));
+        assert!(hidden([1.0, 0.0], [-0.45, 0.2]));
     }
 
     #[test]
@@ -349,11 +350,9 @@ mod tests {
         assert_eq!(verdict(0.155, &[1.37]), Some(Verdict::NotConfirmed), "the pole of nodal elements");
         assert_eq!(verdict(2.0, &[1.6]), Some(Verdict::Confirmed));
         assert_eq!(verdict(2.0, &[1.4]), Some(Verdict::NotConfirmed));
-        assert_eq!(
-            verdict(0.0, &[0.99]),
-            Some(Verdict::NotConfirmed),
-            "of a best value of zero there is a ratio"
-        );
+        // A best value of zero is held against the initial one, as every other is.
+        assert_eq!(verdict_of([1.0, 0.0], &[[10.0, 9.4]]), Some(Verdict::NotConfirmed));
+        assert_eq!(verdict_of([1.0, 0.0], &[[0.4, 0.0]]), Some(Verdict::Confirmed));
         assert_eq!(verdict(1.0, &[1.0]), None);
         assert_eq!(verdict(1.000_002_4, &[1.000_002]), None, "as much may be rounding");
         assert_eq!(verdict(0.5, &[]), None);

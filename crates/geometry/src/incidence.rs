@@ -1,4 +1,5 @@
-//! Which elements touch each node, or other carrier of unknowns, in compressed rows.
+//! Which elements touch each node, or other carrier of unknowns, in compressed rows. Whatever has several carriers may stand for an
+//! element: an edge with two ends, a triangle with three edges.
 
 use crate::ids::{CarrierId, ElementId};
 

@@ -243,6 +243,13 @@ impl Topology {
         self.incidence.around(node)
     }
 
+    /// Whether each node is one of some elements, shape `(n_nodes,)`.
+    pub fn is_node_of(&self, elements: impl IntoIterator<Item = ElementId>) -> Vec<bool> {
+        let mut is_in = vec![false; self.node_count];
+        elements.into_iter().flat_map(|e| self.tet(e)).for_each(|node| is_in[node.index()] = true);
+        is_in
+    }
+
     /// Whether three different nodes make a face of some element.
     pub fn has_face(&self, nodes: [NodeId; 3]) -> bool {
         let [a, b, c] = nodes;

@@ -11,6 +11,7 @@ use fluxmorph_geometry::io::read_msh;
 type Damage = (&'static str, &'static str, usize, &'static str, &'static str);
 
 const V4_DAMAGE: &[Damage] = &[
+    ("4.1 0 8", "5 0 8", 2, "section $MeshFormat", "version 5"),
     ("4.1 0 8", "nan 0 8", 2, "section $MeshFormat", "version nan"),
     ("4.1 0 8", "4.1 0", 2, "section $MeshFormat", "expected the data size"),
     ("$MeshFormat\n", "$NOD\n", 1, "file", "version 1"),

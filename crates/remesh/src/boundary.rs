@@ -183,10 +183,7 @@ impl NodeConditions {
         elements: &[ElementId],
     ) -> Result<(), RemeshError> {
         let topology = mesh.topology();
-        let mut in_region = vec![false; topology.node_count()];
-        for node in elements.iter().flat_map(|&e| topology.tet(e)) {
-            in_region[node.index()] = true;
-        }
+        let in_region = topology.is_node_of(elements.iter().copied());
         for &node in &setup.design_nodes {
             if !in_region[node.index()] {
                 return Err(RemeshError::DesignNodeOutside { node, point: mesh.point(node) });

@@ -188,15 +188,24 @@ ampere_turns = "1 kA"
 terminals = ["z_min", "z_max"]
 "#;
 
+/// Where the bounds end before the mesh does, and where it ends before them.
 #[test]
 fn a_design_that_its_bounds_hold_has_converged_however_little_room_its_mesh_has() {
-    for algorithm in [Algorithm::Mma, Algorithm::Slsqp] {
+    let farther = changed(BAR, &[("upper = \"30 mm\"", "upper = \"31.9 mm\"")]);
+    for algorithm in [Algorithm::Mma, Algorithm::Slsqp, Algorithm::Lbfgs] {
+        let settings = Optimizer { algorithm, max_evaluations: 60, ..Optimizer::default() };
         let mut problem = setup_of(BAR).problem;
-        let settings = Optimizer { algorithm, ..Optimizer::default() };
-        let (optimised, rows) = optimised(&mut problem, &settings, &mut Silent);
-        println!("{algorithm:?}: {:?} after {}", optimised.stop_reason, rows.len());
-        assert!(optimised.best.values.iter().all(|p| (p - 0.03).abs() < 1e-9), "{:?}", optimised.best.values);
-        assert!(optimised.stop_reason.is_converged(), "{algorithm:?}: {:?}", optimised.stop_reason);
+        let (held, rows) = optimised(&mut problem, &settings, &mut Silent);
+        println!("{algorithm:?}: {:?} after {}", held.stop_reason, rows.len());
+        assert!(held.best.values.iter().all(|p| (p - 0.03).abs() < 1e-9), "{:?}", held.best.values);
+        let carried = problem.shape().expect("a shape").carried(&[0.0; 4], &held.best.values);
+        let room = carried.expect("it has a mesh").room.value;
+        assert!(room < 0.05, "the mesh would hold back a search that wants more: {room}");
+        assert!(held.stop_reason.is_converged(), "{algorithm:?}: {:?}", held.stop_reason);
+
+        let (stopped, rows) = optimised(&mut setup_of(&farther).problem, &settings, &mut Silent);
+        println!("{algorithm:?}: {:?} after {}", stopped.stop_reason, rows.len());
+        assert_eq!(stopped.stop_reason, StopReason::MeshLimited, "{algorithm:?}");
     }
 }
 

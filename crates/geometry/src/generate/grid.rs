@@ -208,7 +208,7 @@ impl Grid {
     /// The mesh with this connectivity and these coordinates.
     ///
     /// # Errors
-    /// As [`Grid::topology`].
+    /// As [`Grid::topology`] and [`Mesh::new`].
     pub fn mesh(&self, region_names: &[&str], paint: impl Fn(Point) -> RegionId) -> Result<Mesh, MeshError> {
         Mesh::new(Arc::new(self.topology(region_names, paint)?), self.points())
     }
@@ -263,12 +263,24 @@ impl Grid {
 /// # Errors
 /// [`MeshError::Parameter`].
 pub(crate) fn check_size(parameter: &'static str, cells: [usize; 3]) -> Result<(), MeshError> {
+    check_tets(parameter, cells, [&format!("{cells:?} cells"), "larger cells"])
+}
+
+/// The same in the words of a generator: what asks for so many cells, and what to use instead.
+///
+/// # Errors
+/// [`MeshError::Parameter`].
+pub(super) fn check_tets(
+    parameter: &'static str,
+    cells: [usize; 3],
+    [value, instead]: [&str; 2],
+) -> Result<(), MeshError> {
     let tets = cells.iter().fold(TETS_PER_CELL as u64, |n, &c| n.saturating_mul(c as u64));
     if tets <= TETS_LIMIT {
         return Ok(());
     }
-    let expected = format!("at most {TETS_LIMIT} tetrahedra are made; use larger cells");
-    Err(MeshError::parameter(parameter, format!("{cells:?} cells, {tets} tetrahedra"), expected))
+    let expected = format!("at most {TETS_LIMIT} tetrahedra are made; use {instead}");
+    Err(MeshError::parameter(parameter, format!("{value}, {tets} tetrahedra"), expected))
 }
 
 #[cfg(test)]

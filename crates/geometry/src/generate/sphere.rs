@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use crate::error::MeshError;
 use crate::generate::grading::{self, LINES_LIMIT, Skin};
-use crate::generate::grid::{PATHS, TETS_PER_CELL, check_size};
+use crate::generate::grid::{PATHS, TETS_PER_CELL, check_tets};
 use crate::generate::sphere_nodes::Numbering;
 use crate::ids::{NodeId, RegionId};
 use crate::mesh::Mesh;
@@ -133,7 +133,8 @@ fn shells(parameters: &SphereParameters) -> Result<(usize, Vec<f64>), MeshError>
     check(parameters)?;
     let n = ((parameters.divisions as f64 * parameters.refinement).round() as usize).max(1);
     let radii = radii(parameters, n)?;
-    check_size("sphere.divisions", cells(n, &radii))?;
+    let value = format!("{n} with {} layers", radii.len() - 1 - n);
+    check_tets("sphere.divisions", cells(n, &radii), [&value, "fewer divisions"])?;
     Ok((n, radii))
 }
 

@@ -165,7 +165,7 @@ impl Run<'_> {
                  asked for, as there is no loss at 0 Hz; leave it out of the objective"
             } else {
                 "the objective of the initial design is zero: there is no field to change, its terms cancel, it is the deviation within \
-                 a single element, or this design is an optimum already; check coils, regions, frequencies and weights"
+                 a single element, or nothing is left to minimise; check coils, regions, frequencies and weights"
             };
             return Err(Error::Optimisation { cause });
         }

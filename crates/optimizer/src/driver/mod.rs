@@ -10,7 +10,7 @@
 //! * What follows from one search is decided in `search`: the next one begins at the best design, or in a smaller trust region
 //!   around it (`trust_region`). Where nothing is left the run ends with [`StopReason::MeshLimited`]; so does one whose method came
 //!   to its tolerance in a small trust region while the gradient promises as much as before (`promised_gain`): that is no
-//!   convergence.
+//!   convergence. Where bounds and constraints leave less of the gradient than the tolerance it is, whatever the mesh has left.
 //! * Where the method ends and no design keeps all constraints, the worst of them is minimised until one does; then the method goes
 //!   on from there. Where none does the run ends with the least violation.
 //! * Where a search asks for the best design once more, to rounding, it has come to its end.

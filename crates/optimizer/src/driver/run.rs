@@ -369,12 +369,12 @@ impl<'a> Run<'a> {
 
     /// Whether bounds and constraints together leave nothing of what the gradient promises at the best design.
     pub(super) fn is_held(&self) -> bool {
-        self.least_promised().is_some_and(|least| least < HELD_TOLERANCES * self.settings.least_gain())
+        self.leaves_less_than(HELD_TOLERANCES)
     }
 
-    /// Whether the gradient promises more at the best design than the tolerance of the objective, with what bounds and constraints leave.
-    pub(super) fn may_gain(&self) -> bool {
-        self.least_promised().is_none_or(|least| least > self.settings.least_gain())
+    /// Whether bounds and constraints leave less of what the gradient promises at the best design than so many times the tolerance.
+    pub(super) fn leaves_less_than(&self, tolerances: f64) -> bool {
+        self.least_promised().is_some_and(|least| least < tolerances * self.settings.least_gain())
     }
 
     fn least_promised(&self) -> Option<f64> {

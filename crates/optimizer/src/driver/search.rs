@@ -70,6 +70,11 @@ pub(super) enum NextStep {
     },
 }
 
+/// Whether another design may be better than the best one by more than the tolerance, or keep what that violates.
+fn may_gain(run: &Run<'_>) -> bool {
+    run.violates() || !run.leaves_less_than(1.0)
+}
+
 /// The state of the search for the best design between two starts of the method.
 pub(super) struct Search<'a> {
     settings: &'a Settings,
@@ -213,7 +218,7 @@ impl<'a> Search<'a> {
                 // At an optimum that bounds and constraints hold there is no step but rounding.
                 Ending::Roundoff if run.is_held() => StopReason::ObjectiveConverged,
                 Ending::Roundoff => StopReason::RoundoffLimited,
-                _ if run.is_held_back && run.may_gain() || self.is_throttled(run) => StopReason::MeshLimited,
+                _ if may_gain(run) && (run.is_held_back || self.is_throttled(run)) => StopReason::MeshLimited,
                 Ending::Objective | Ending::Entered => StopReason::ObjectiveConverged,
                 Ending::Step => StopReason::StepConverged,
             }),
@@ -245,6 +250,7 @@ impl<'a> Search<'a> {
                 NextStep::ShrinkTrustRegion { refused: refusal, gained }
             }
             None if run.violates() && !self.is_restoring => NextStep::Restore,
+            None if !may_gain(run) => NextStep::Stop(StopReason::ObjectiveConverged),
             None => {
                 run.warn(&format!("{}: the mesh carries the design no further", refusal.cause));
                 NextStep::Stop(StopReason::MeshLimited)

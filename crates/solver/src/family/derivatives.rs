@@ -64,7 +64,7 @@ fn triangles<const N: usize, const F: usize>(family: &impl Matrices<N, F>) {
     let triangle: [Point; 3] = [[0.1, 0.0, 0.2], [1.1, 0.3, 0.0], [0.2, 0.8, 0.5]];
     let (l, u) = (values::<F, 4>(5), values::<F, 4>(60));
     let impedance = SurfaceTerm::Impedance(c64::new(0.7, 0.7), 0);
-    // The interface is linear in each coordinate: exact at any step.
+    // The interface is linear in each coordinate: exact at any step. Edge elements have none.
     for (term, step) in [(impedance, [1e-5, 1e-8]), (SurfaceTerm::Interface(1.3), [0.5, 1e-13])] {
         let value = |vertices| {
             let matrix = family.triangle(vertices, term);

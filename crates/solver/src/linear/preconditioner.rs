@@ -16,7 +16,7 @@ pub(super) struct Preconditioner {
     pub(super) method: Method,
     /// What it cost, and what an iteration with it costs.
     pub(super) costs: Costs,
-    /// What it does.
+    /// `z = M⁻¹ r`.
     pub(super) action: Box<dyn Precondition>,
 }
 

@@ -14,12 +14,8 @@ impl ConnectedSets {
     /// The sets of the given elements, in any order of theirs.
     pub(super) fn new(topology: &Topology, elements: &[ElementId]) -> Self {
         let mut sets = DisjointSets::new(topology.node_count());
-        let mut is_in = vec![false; topology.node_count()];
-        for &e in elements {
-            let tet = topology.tet(e);
-            tet.iter().for_each(|n| is_in[n.index()] = true);
-            sets.join(tet.map(NodeId::index));
-        }
+        let is_in = topology.is_node_of(elements.iter().copied());
+        elements.iter().for_each(|&e| sets.join(topology.tet(e).map(NodeId::index)));
         let mut nodes: Vec<Vec<NodeId>> = Vec::new();
         let mut set_of_root = vec![0usize; topology.node_count()];
         for node in topology.nodes().filter(|n| is_in[n.index()]) {
