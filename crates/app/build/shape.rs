@@ -13,12 +13,12 @@ use fluxmorph_optimizer::problem::Shape;
 use fluxmorph_remesh::{ElasticMap, Motion, RemeshSetup, Subregion};
 use fluxmorph_solver::FieldModel;
 
-use super::elastic_body::{Mover, common_axis, guidance, motion_law, remesh_setup, unused_keys};
+use super::elastic_body::{Mover, common_axis, guidance, motion_law, regions_at, remesh_setup, unused_keys};
 use super::entries::{is_air, material};
 use super::functional::FixedElements;
 use super::held::held_node_fault;
 use super::plausible;
-use super::soundness::{faces_of, unit_warning};
+use super::soundness::unit_warning;
 use crate::config::{self, Config, Design, Diagnostic, RegionModel, Remesh, SourceMap};
 use crate::error::Error;
 
@@ -279,11 +279,10 @@ pub(super) fn shape(
 ) -> Result<Shape, Error> {
     let Inputs { source, design, mesh, full_mesh, .. } = *inputs;
     let Body { full_surface, surface, motion } = body;
-    let mut faults = overlap_faults(inputs, motion.moving(), models, observed);
+    let mut faults = overlap_faults((inputs, surface.nodes()), motion.moving(), models, observed);
     let moves = |node: NodeId| may_move(&surface, motion.map(), node);
-    faults.extend(
-        models.iter().find_map(|model| model.torn_source(moves)).map(|e| source_fault(inputs, config, e)),
-    );
+    let torn = models.iter().find_map(|model| model.torn_source(moves));
+    faults.extend(torn.map(|e| source_fault((inputs, surface.nodes()), config, e)));
     if faults.is_empty() {
         faults.extend(held_node_fault(inputs, &surface, motion.map(), &models[0]));
     }
@@ -375,7 +374,7 @@ pub(super) fn may_move(surface: &DesignSurface, map: &ElasticMap, node: NodeId) 
 /// Refuses a remesh region that meets the shell of open space, which must stay where it is, or an observation region of which it is
 /// not said whether it does.
 fn overlap_faults(
-    inputs: &Inputs<'_>,
+    (inputs, design_nodes): (&Inputs<'_>, &[NodeId]),
     moving: &[ElementId],
     models: &[FieldModel],
     observed: &[FixedElements],
@@ -401,7 +400,7 @@ fn overlap_faults(
         let message = format!("the shell of open space reaches into the remesh region, at {at}");
         let fault = source.diagnostic("open", message);
         let fault = fault.expected("a remesh region inside the shell, which does not move");
-        faults.push(match brought_in(inputs, e) {
+        faults.push(match brought_in((inputs, design_nodes), e) {
             Some(cure) => fault.help(cure),
             None => fault,
         });
@@ -410,7 +409,11 @@ fn overlap_faults(
 }
 
 /// A coil, or an end of its window, in an element that would move.
-fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Diagnostic {
+fn source_fault(
+    (inputs, design_nodes): (&Inputs<'_>, &[NodeId]),
+    config: &Config,
+    element: ElementId,
+) -> Diagnostic {
     let Inputs { source, mesh, .. } = *inputs;
     let (at, region) =
         (millimetres(centroid(mesh.vertices(element))), mesh.topology().region_name_at(element));
@@ -427,7 +430,7 @@ fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Dia
     let fault = fault.expected(
         "a remesh region without nodes of elements that a winding or an end of its window cuts: a coil does not move with the mesh",
     );
-    let cure = match brought_in(inputs, element) {
+    let cure = match brought_in((inputs, design_nodes), element) {
         Some(cure) => cure,
         None => "shrink the remesh region, or make what is in the coil's window a region of its own that stays; of a coil that is a \
                  region of the mesh only that has to stay"
@@ -439,37 +442,32 @@ fn source_fault(inputs: &Inputs<'_>, config: &Config, element: ElementId) -> Dia
     })
 }
 
-/// That an element moves by a surface alone, not by `remesh.region`: its region has a face in the design surface, or it has a node there,
-/// or in a surface in which `[remesh]` lets nodes move.
-fn brought_in(inputs: &Inputs<'_>, element: ElementId) -> Option<String> {
+/// That an element moves by a surface alone, not by `remesh.region`: its region is at the design surface, or it has a node there, or in a
+/// surface in which `[remesh]` lets nodes move.
+fn brought_in((inputs, design_nodes): (&Inputs<'_>, &[NodeId]), element: ElementId) -> Option<String> {
     let Inputs { design, remesh, mesh, .. } = *inputs;
     let topology = mesh.topology();
-    let region = topology.region_name_at(element);
+    let (region, tet) = (topology.region_name_at(element), topology.tet(element));
     let config::RemeshExtent::Regions(named) = &remesh.extent else { return None };
     if named.iter().any(|own| own == region) {
         return None;
     }
-    let has_node_in = |surface: &String| {
+    let is_designed = regions_at(mesh, design_nodes).contains(&topology.region_of()[element.index()])
+        || tet.iter().any(|node| design_nodes.binary_search(node).is_ok());
+    let has_node_in = |surface: &&String| {
         let faces = topology.surface(surface);
-        faces.is_ok_and(|faces| faces.iter().flatten().any(|node| topology.tet(element).contains(node)))
+        faces.is_ok_and(|faces| faces.iter().flatten().any(|node| tet.contains(node)))
     };
-    let has_face_in = |surface: &String| {
-        let faces = faces_of(topology, [surface.as_str()]);
-        let is_at = |e: ElementId| topology.region_name_at(e) == region;
-        let mut facets = topology.facets().iter().filter(|facet| faces.contains(&face_key(facet.nodes)));
-        facets.any(|facet| is_at(facet.inside) || facet.outside.is_some_and(is_at))
-    };
-    let is_designed = |surface: &&String| has_face_in(surface) || has_node_in(surface);
-    let (what, surface) = if let Some(own) = design.surface.iter().find(is_designed) {
-        ("the design surface", own)
-    } else if let Some(own) = remesh.free.iter().find(|surface| has_node_in(surface)) {
-        ("a surface in remesh.free,", own)
+    let surface = if is_designed {
+        format!("the design surface `{}`", design.surface.join("`, `"))
+    } else if let Some(own) = remesh.free.iter().find(has_node_in) {
+        format!("a surface in remesh.free, `{own}`")
     } else {
-        ("a surface in remesh.slide,", remesh.slide.iter().find(|surface| has_node_in(surface))?)
+        format!("a surface in remesh.slide, `{}`", remesh.slide.iter().find(has_node_in)?)
     };
     Some(format!(
-        "`{region}` moves because it touches {what} `{surface}`, not by remesh.region: take another surface, or lay a region between it \
-         and what stays"
+        "`{region}` moves because it touches {surface}, not by remesh.region: take another surface, or lay a region between it and what \
+         stays"
     ))
 }
 

@@ -56,13 +56,13 @@ fn print_usage(error: &clap::Error) -> ExitCode {
     if error.use_stderr() {
         return ExitCode::Usage;
     }
-    match stdout::unless_closed(printed) {
-        Ok(()) => ExitCode::Success,
-        Err(error) => {
-            let _ = writeln!(std::io::stderr(), "{}", message(&error));
-            error.exit_code()
-        }
-    }
+    stdout::unless_closed(printed).map_or_else(|error| report_error(&error), |()| ExitCode::Success)
+}
+
+/// Shows an error on standard error; its exit code.
+fn report_error(error: &Error) -> ExitCode {
+    let _ = writeln!(std::io::stderr(), "{}", message(error));
+    error.exit_code()
 }
 
 /// Runs a command; its exit code.
@@ -94,8 +94,7 @@ fn run_command(cli: &Cli) -> ExitCode {
             }
             return error.exit_code();
         }
-        let _ = writeln!(std::io::stderr(), "{}", message(&error));
-        error.exit_code()
+        report_error(&error)
     })
 }
 

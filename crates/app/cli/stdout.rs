@@ -19,7 +19,7 @@ fn write(text: &str) -> Result<(), Error> {
 }
 
 /// An error of standard output. A reader that has closed its end, such as `head`, has what it wanted: that is none.
-pub fn unless_closed(written: std::io::Result<()>) -> Result<(), Error> {
+pub(super) fn unless_closed(written: std::io::Result<()>) -> Result<(), Error> {
     match written {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(OutputError::io("write to", STDOUT)(error).into())

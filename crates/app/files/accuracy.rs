@@ -171,16 +171,16 @@ impl Accuracy {
     /// ratio, or where it has no error bar in the unit of the objective.
     pub fn hides_gain(&self, own: [f64; 2]) -> bool {
         let [initial, best] = own;
-        let hides = match self.error_estimate {
-            Some([first, last]) if !self.has_ratio(own) || self.error_estimate_relative.is_none() => {
+        let hides = match (self.error_estimate_relative, self.error_estimate) {
+            (Some(error), _) => {
+                let ratio = best / initial;
+                SAFETY * error * ratio.abs() >= (ratio - 1.0).abs()
+            }
+            (None, Some([first, last])) => {
                 let error = (last - first).abs().max(UNCANCELLED * first.abs().max(last.abs()));
                 SAFETY * error >= (best - initial).abs()
             }
-            _ => {
-                let ratio = best / initial;
-                let bar = self.error_estimate_relative.map(|error| SAFETY * error * ratio.abs());
-                bar.is_some_and(|bar| bar >= (ratio - 1.0).abs())
-            }
+            (None, None) => false,
         };
         self.verdict == Some(Verdict::Confirmed) && hides
     }
