@@ -67,6 +67,9 @@ fn a_shell_of_a_mesh_file_is_open_space() {
     let around = "flux_parallel = [\"x_min\", \"y_min\"]\n\n[open]\nsurfaces = [\"x_max\", \"y_max\", \"z_min\", \"z_max\"]";
     execute("solve", home.path(), &[(walls, around)]).completed();
     let run = home.path().join("run");
+    // Of the page it is no part.
+    fluxmorph(&[&"report", &run]).completed();
+    assert!(read_text(&run.join("report.html")).contains("in a mesh of 70 × 70 × 90 mm"));
     let expected = read_json(&run.join("result.json"));
     std::fs::copy(run.join("optimum.msh"), home.path().join("shell.msh")).expect("copied");
     let own = "flux_parallel = [\"x_min\", \"y_min\", \"infinity\"]\n\n[open]\nregion = \"open\"";

@@ -39,6 +39,8 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
         flux_density: densities,
         deviation: None,
     };
+    let accuracy = data.result.as_ref().and_then(|result| result.accuracy.as_ref());
+    let estimate = accuracy.and_then(|accuracy| accuracy.error_estimate).map(|[_, best]| best);
     let window = Window::new(data, outline, field);
     let cut = FieldCut::new(&window, outline, &shares);
     let values = cut.triangles.iter().flat_map(|triangle| triangle.patch.map(|(_, value)| value));
@@ -49,10 +51,11 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
     let caption = format!(
         "Where the estimated error of the objective at the best design is made, in {}: the sizes of what all elements add, \
          as shares of their sum in each cubic centimetre, logarithmic scale. With their signs they add up to {}, of the \
-         {} that they have without.",
+         {} that they have without{}.",
         window.describe("mm"),
         number(sum, 3),
-        number(total, 3)
+        number(total, 3),
+        estimate.map_or_else(String::new, |estimate| format!("; the estimate is {}", number(estimate, 3)))
     );
     let range = (high / RANGE, high, Count::Logarithmic);
     let picture = Picture::new(outline, window, range, ColourMap::Field, "share of the error [%/cm³]");

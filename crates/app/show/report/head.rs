@@ -9,6 +9,7 @@ use super::observed;
 use super::plane::bounds;
 use super::tables::of_first_state;
 use super::ticks::{self, decimals_of, duration, group_digits, number, threads, trim_zeros};
+use super::window::inside;
 use super::words;
 use crate::build::Outline;
 use crate::config::Objective;
@@ -40,7 +41,7 @@ pub(super) fn head(data: &RunData) -> Markup {
     cards.extend(iron::cards(data));
     if let Ok(outline) = &data.outline {
         cards.extend(mean_card(data, outline));
-        cards.push(size_card(outline));
+        cards.push(size_card(data, outline));
     }
     header(kind, &data.config.title, (class, &status), &lead, &cards)
 }
@@ -189,17 +190,19 @@ fn mean_card(data: &RunData, outline: &Outline) -> Option<Card> {
     Some(("mean |B|", after?, remark))
 }
 
-/// Extents of the design surface and of the mesh.
-fn size_card(outline: &Outline) -> Card {
+/// Extents of the design surface and of the mesh, without the shell of open space.
+fn size_card(data: &RunData, outline: &Outline) -> Card {
     let extents = |[low, high]: [[f64; 3]; 2]| [0, 1, 2].map(|d| high[d] - low[d]);
     let shown = |extents: &[f64]| {
         let extents: Vec<f64> = extents.iter().map(|e| 1e3 * e).collect();
         let decimals = decimals_of(&extents, 1);
         extents.iter().map(|e| trim_zeros(*e, decimals)).collect::<Vec<_>>().join(" × ")
     };
-    let mesh = shown(&extents(outline.full_mesh.bounding_box()));
+    let mesh = shown(&extents(inside(&data.config, &outline.full_mesh)));
     let Some(design) = &outline.design else {
-        return ("size", format!("{mesh} mm"), "of the whole mesh".to_owned());
+        let of_what =
+            if data.config.open.is_some() { "of the mesh inside of open space" } else { "of the whole mesh" };
+        return ("size", format!("{mesh} mm"), of_what.to_owned());
     };
     let nodes = design.surface.nodes().iter().map(|&n| outline.full_mesh.point(n));
     let surface: Vec<f64> = extents(bounds(nodes)).into_iter().filter(|e| *e > 1e-9).collect();

@@ -1,5 +1,6 @@
 //! Which plane through the device is shown, and which part of it: what is observed, what moves, and the coils.
 
+use fluxmorph_geometry::Mesh;
 use fluxmorph_geometry::tet4::Point;
 
 use super::coils::extent;
@@ -8,8 +9,8 @@ use super::data::{RunData, Snapshot};
 use super::map::view_normal;
 use super::observed;
 use super::plane::{Plane, bounds};
-use crate::build::Outline;
-use crate::config::CoilShape;
+use crate::build::{Outline, is_open};
+use crate::config::{CoilShape, Config};
 
 /// Share of the window that is added around what must be seen.
 const ROOM: f64 = 0.12;
@@ -37,7 +38,7 @@ impl Window {
             .design
             .as_ref()
             .map(|design| bounds(design.surface.nodes().iter().map(|&n| outline.full_mesh.point(n))));
-        let whole = bounds(outline.mesh.points().iter().copied());
+        let whole = inside(&data.config, &outline.mesh);
         let centre = observed.or(moved).unwrap_or(whole);
         let upwards = outline.design.as_ref().map_or([0.0, 0.0, 1.0], |d| view_normal(data, d));
         let up = (0..3).fold(2, |best, d| if upwards[d].abs() > upwards[best].abs() { d } else { best });
@@ -78,6 +79,15 @@ impl Window {
         let axis = ["x", "y", "z"][self.plane.axis];
         format!("the plane {axis} = {} {millimetres}", super::ticks::trim_zeros(1e3 * self.plane.at, 1))
     }
+}
+
+/// Lower and upper corners around a mesh without the shell of open space.
+pub(super) fn inside(config: &Config, mesh: &Mesh) -> [Point; 2] {
+    let topology = mesh.topology();
+    let regions = topology.region_names().iter().filter(|name| !is_open(config, name));
+    let regions = regions.filter_map(|name| topology.region(name).ok());
+    let elements = regions.flat_map(|region| topology.elements_of(region));
+    bounds(elements.flat_map(|e| mesh.vertices(e)))
 }
 
 /// Lower and upper corners around the designed bodies and the coils that are regions of the mesh, as they are after.

@@ -2,12 +2,10 @@
 
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use crate::fem::scalar::{Scalar, c32, c64};
 
-/// Rows per parallel task of a product.
-const ROWS_PER_TASK: usize = 1024;
+/// Entries above which the rows of a product are divided between two parallel tasks: some 20 µs of work.
+const ENTRIES_PER_TASK: usize = 1 << 14;
 
 /// Row pointers and sorted column indices.
 #[derive(Debug, PartialEq, Eq)]
@@ -112,14 +110,7 @@ impl<T: Scalar> CsrMatrix<T> {
     /// # Panics
     /// If `x` or `y` does not fit the matrix.
     pub fn mul<X: RowProduct<T>>(&self, x: &[X], y: &mut [X]) {
-        assert_eq!((y.len(), x.len()), (self.structure.row_count(), self.structure.column_count));
-        y.par_chunks_mut(ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
-            for (i, y) in rows.iter_mut().enumerate() {
-                let range = self.structure.row(task * ROWS_PER_TASK + i);
-                let columns = &self.structure.columns[range.clone()];
-                *y = X::row_product(&self.values[range], columns, x);
-            }
-        });
+        self.for_each_product(x, y, &|_, product| product);
     }
 
     /// `b − A x`.
@@ -128,9 +119,46 @@ impl<T: Scalar> CsrMatrix<T> {
     /// If `x` or `b` does not fit the matrix.
     pub fn residual<X: RowProduct<T>>(&self, x: &[X], b: &[X]) -> Vec<X> {
         let mut r = vec![X::default(); b.len()];
-        self.mul(x, &mut r);
-        r.par_iter_mut().with_min_len(ROWS_PER_TASK).zip(b).for_each(|(r, &b)| *r = b - *r);
+        self.for_each_product(x, &mut r, &|row, product| b[row] - product);
         r
+    }
+
+    /// Overwrites `y` with `value(row, (A x)_row)`.
+    fn for_each_product<X: RowProduct<T>>(
+        &self,
+        x: &[X],
+        y: &mut [X],
+        value: &(impl Fn(usize, X) -> X + Sync),
+    ) {
+        assert_eq!((y.len(), x.len()), (self.structure.row_count(), self.structure.column_count));
+        self.products_from(0, x, y, value);
+    }
+
+    /// The same for the rows from `first` on, halved by their entries: rows of coarse levels may be long, and stand together.
+    fn products_from<X: RowProduct<T>>(
+        &self,
+        first: usize,
+        x: &[X],
+        y: &mut [X],
+        value: &(impl Fn(usize, X) -> X + Sync),
+    ) {
+        let starts = &self.structure.row_starts[first..=first + y.len()];
+        let entries = starts[y.len()] - starts[0];
+        if y.len() > 1 && entries as usize > ENTRIES_PER_TASK {
+            let half = starts.partition_point(|&start| start - starts[0] < entries / 2).clamp(1, y.len() - 1);
+            let (one, other) = y.split_at_mut(half);
+            let next = first + half;
+            rayon::join(
+                || self.products_from(first, x, one, value),
+                || self.products_from(next, x, other, value),
+            );
+        } else {
+            for (row, y) in (first..).zip(y) {
+                let range = self.structure.row(row);
+                let columns = &self.structure.columns[range.clone()];
+                *y = value(row, X::row_product(&self.values[range], columns, x));
+            }
+        }
     }
 
     /// `Aᵀ x`, overwriting `y`; serial, for the few rectangular products of the method.
@@ -159,6 +187,7 @@ impl<T: Scalar> CsrMatrix<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::determinism::same_on_any_threads;
 
     #[test]
     fn a_product_is_the_sum_over_the_rows_for_all_pairs_of_types() {
@@ -180,5 +209,23 @@ mod tests {
         let mut z = [c64::default(); 3];
         complex.mul(&x, &mut z);
         assert_eq!(z, y.map(|c| c * c64::new(0.0, 1.0)));
+    }
+
+    #[test]
+    fn rows_of_any_length_have_the_same_product_on_any_threads() {
+        // One row with half of the entries, none in others, and more than a task of either kind.
+        let n = 4 * ENTRIES_PER_TASK;
+        let length = |row: usize| if row == 7 { n } else { row % 3 };
+        let entry = |row: usize, k: usize| ((row + k) % n, ((row * k) as f64 * 0.7).sin());
+        let rows = (0..n).map(|row| (0..length(row)).map(|k| entry(row, k)).collect());
+        let a = CsrMatrix::from_rows(n, rows);
+        let x: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).cos()).collect();
+        let b: Vec<f64> = x.iter().map(|x| x * x).collect();
+        let r = same_on_any_threads(|| a.residual(&x, &b));
+        for row in [0, 1, 7, n / 2, n - 1] {
+            let range = a.structure.row(row);
+            let terms = range.map(|k| a.values[k] * x[a.structure.columns[k] as usize]);
+            assert_eq!(r[row], b[row] - terms.sum::<f64>(), "row {row}");
+        }
     }
 }

@@ -36,5 +36,5 @@ pub use ldlt::{FactorScalar, KeptPanels, Ldlt, LdltAnalysis};
 pub use lifted_ordering::{Hosts, lifted_dissection};
 pub use pattern::{BlockPattern, BoundGroup, Coupling, ElementGroup};
 pub use rotated::RotatedMatrix;
-pub use scalar::{Scalar, advance, axpy, c32, c64, dot, norm, scale_add};
+pub use scalar::{Scalar, advance, axpy, c32, c64, dot, dots, norm, scale_add};
 pub use strong_sets::StrongSets;

@@ -105,12 +105,31 @@ fn lane_sum<T: Scalar>(range: Range<usize>, mut term: impl FnMut(usize) -> T) ->
 }
 
 /// The bilinear product `Σ x_i y_i`, without conjugation: the one that complex symmetric systems need.
+///
+/// # Panics
+/// If the lengths differ.
 pub fn dot<T: Scalar>(x: &[T], y: &[T]) -> T {
-    debug_assert_eq!(x.len(), y.len());
-    let n = x.len().min(y.len());
-    // Of one length that the compiler knows, so that it checks no index.
-    let (x, y) = (&x[..n], &y[..n]);
-    ordered_sum(n, |i| x[i] * y[i])
+    let [product] = dots(x, [y]);
+    product
+}
+
+/// The bilinear products of `x` with several vectors, in one pass.
+///
+/// # Panics
+/// If the lengths differ.
+pub fn dots<T: Scalar, const N: usize>(x: &[T], ys: [&[T]; N]) -> [T; N] {
+    let n = x.len();
+    assert!(ys.iter().all(|y| y.len() == n), "vectors of one length");
+    let of_chunk = |c: usize| {
+        let x = &x[chunk(c, n)];
+        ys.map(|y| {
+            // Of one length that the compiler knows, so that it checks no index.
+            let y = &y[chunk(c, n)][..x.len()];
+            lane_sum(0..x.len(), |i| x[i] * y[i])
+        })
+    };
+    let chunks: Vec<[T; N]> = (0..n.div_ceil(CHUNK)).into_par_iter().map(of_chunk).collect();
+    std::array::from_fn(|k| chunks.iter().map(|sums| sums[k]).sum())
 }
 
 /// The Euclidean norm `sqrt(Σ |x_i|²)`.
@@ -200,6 +219,7 @@ mod tests {
             let (mut x, p, mut r, q) = (vector(0.1), vector(0.2), vector(0.3), vector(0.4));
             let length = advance(a, (&mut x, &p), (&mut r, &q));
             assert_eq!(length.to_bits(), norm(&r).to_bits());
+            assert_eq!(dots(&p, [&q, &r]), [dot(&p, &q), dot(&p, &r)]);
             axpy(a, &q, &mut x);
             scale_add(a, &mut r, &p);
             (x, r, length)

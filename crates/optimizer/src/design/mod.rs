@@ -7,7 +7,8 @@
 //! (`boundary_edges`). In every case `W` is sparse, its weights are not negative, and a row sums to one, or to zero at a node
 //! that stays. So the displacements of the surface's faces keep the bounds of the variables, and the transpose, which takes
 //! derivatives at the nodes to those with respect to `p`, is exact. On a finer mesh of the same body the variables stay what
-//! they are (`refined`). What a grid describes between the nodes the facets have only about (`facets`).
+//! they are, and new nodes follow the ends of the edges that they halve (`refined`). What a grid describes between the nodes the
+//! facets have only about (`facets`).
 
 mod boundary_edges;
 mod facets;
@@ -218,6 +219,8 @@ pub struct DesignSurface {
     /// Displacements of the nodes for a unit displacement of the faces around them.
     mitres: Vec<f64>,
     rows: Vec<Row>,
+    /// Of the last nodes, which a finer mesh has in the middle of edges, the places of both ends in `nodes`, which come before.
+    ends: Vec<[usize; 2]>,
     points: Vec<Point>,
     filter_radius: Option<f64>,
     grid: Option<grid::ControlGrid>,
@@ -287,7 +290,8 @@ impl DesignSurface {
             Control::Filter(radius) => Some(radius),
             Control::Nodes | Control::Grid(_) => None,
         };
-        let mut surface = Self { nodes, directions, mitres, rows, points, filter_radius, grid };
+        let ends = Vec::new();
+        let mut surface = Self { nodes, directions, mitres, rows, ends, points, filter_radius, grid };
         if on_nodes {
             surface.drop_idle();
         }
@@ -371,32 +375,47 @@ impl DesignSurface {
         self.rows.iter().map(|row| row.iter().map(|&(k, weight)| weight * p[k]).sum()).collect()
     }
 
-    /// `Δx_b = D M W p` [m], one displacement per node.
-    pub fn displacement(&self, p: &[f64]) -> Vec<Point> {
-        let normal_displacements = self.normal_displacements(p);
-        normal_displacements
-            .iter()
-            .zip(self.directions.iter().zip(&self.mitres))
-            .map(|(along, (direction, mitre))| direction.map(|d| mitre * along * d))
-            .collect()
+    /// How many nodes have rows of their own; those behind them are in the middle of edges.
+    fn row_count(&self) -> usize {
+        self.nodes.len() - self.ends.len()
     }
 
-    /// `Wᵀ g`: from derivatives with respect to the normal displacements to those with respect to the variables.
-    pub fn normal_displacement_gradient(&self, nodal: &[f64]) -> Vec<f64> {
-        let mut gradient = vec![0.0; self.variable_count()];
-        for (row, g) in self.rows.iter().zip(nodal) {
-            for &(k, weight) in row {
-                gradient[k] += weight * g;
-            }
+    /// `Δx_b = D M W p` [m], one displacement per node.
+    pub fn displacement(&self, p: &[f64]) -> Vec<Point> {
+        let along = self.normal_displacements(p);
+        let step = |i: usize| self.directions[i].map(|d| self.mitres[i] * along[i] * d);
+        let mut displacement: Vec<Point> = (0..self.row_count()).map(step).collect();
+        for &[a, b] in &self.ends {
+            let (a, b) = (displacement[a], displacement[b]);
+            displacement.push(std::array::from_fn(|d| 0.5 * (a[d] + b[d])));
         }
-        gradient
+        displacement
     }
 
     /// `Wᵀ M Dᵀ g`: from derivatives with respect to the nodes' positions to those with respect to the variables.
     pub fn gradient(&self, nodal: &[Point]) -> Vec<f64> {
-        let steps = self.directions.iter().zip(&self.mitres);
-        let along: Vec<f64> = steps.zip(nodal).map(|((d, mitre), g)| mitre * dot(*d, *g)).collect();
-        self.normal_displacement_gradient(&along)
+        let mut nodal = nodal.to_vec();
+        let rows = self.row_count();
+        for (new, ends) in self.ends.iter().enumerate().rev() {
+            let half = nodal[rows + new].map(|g| 0.5 * g);
+            ends.iter().for_each(|&end| (0..3).for_each(|d| nodal[end][d] += half[d]));
+        }
+        let mut gradient = vec![0.0; self.variable_count()];
+        for (place, g) in nodal.into_iter().enumerate().take(rows) {
+            self.slopes(place, g, &mut |k, slope| gradient[k] += slope);
+        }
+        gradient
+    }
+
+    /// Hands out the variables that move the node at a place of [`Self::nodes`], some of them repeatedly, each with its part of the
+    /// derivative of what has the derivative `g` with respect to the position of that node.
+    pub fn slopes(&self, place: usize, g: Point, add: &mut impl FnMut(usize, f64)) {
+        if let Some(new) = place.checked_sub(self.row_count()) {
+            self.ends[new].iter().for_each(|&end| self.slopes(end, g.map(|g| 0.5 * g), add));
+        } else {
+            let along = self.mitres[place] * dot(self.directions[place], g);
+            self.rows[place].iter().for_each(|&(k, weight)| add(k, weight * along));
+        }
     }
 }
 

@@ -16,7 +16,7 @@
 use std::collections::BTreeMap;
 
 use fluxmorph_geometry::Mesh;
-use fluxmorph_geometry::tet4::{dot, norm};
+use fluxmorph_geometry::tet4::norm;
 use fluxmorph_remesh::{Moved, RemeshError};
 
 use super::NoThickness;
@@ -150,10 +150,9 @@ impl ThicknessBound {
                     }
                     continue;
                 };
-                let along = sign * surface.mitres()[place] * dot(derivative, surface.directions()[place]);
-                for &(variable, weight) in &surface.rows()[place] {
-                    *slopes.entry(variable).or_default() += along * weight;
-                }
+                surface.slopes(place, derivative, &mut |variable, slope| {
+                    *slopes.entry(variable).or_default() += sign * slope;
+                });
             }
             let slopes: Vec<_> = slopes.into_iter().filter(|(_, slope)| *slope != 0.0).collect();
             match slopes.is_empty() {

@@ -4,7 +4,7 @@
 //! The direction update is the flexible one, `β = zᵀ(r⁺ − r) / ρ = −α zᵀq / ρ`: a preconditioner in single precision is
 //! symmetric only up to its rounding, and the usual `zᵀr⁺ / ρ` would let that rounding grow.
 
-use fluxmorph_geometry::fem::{CsrMatrix, advance, c64, dot, norm, scale_add};
+use fluxmorph_geometry::fem::{CsrMatrix, advance, c64, dot, dots, norm, scale_add};
 
 /// How an iteration ended; the caller checks the true residual.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +38,7 @@ pub fn solve(
     let mut iterations = 0;
     while iterations < max_iterations && size > target && !stop(iterations, size) {
         precondition(&residual, &mut preconditioned);
-        let (zr, zq) = (dot(&preconditioned, &residual), dot(&preconditioned, &image));
+        let [zr, zq] = dots(&preconditioned, [&residual, &image]);
         let beta = quotient(-alpha * zq, rho);
         rho = zr;
         scale_add(beta, &mut direction, &preconditioned);

@@ -39,6 +39,9 @@ struct Kept<T> {
     panels: KeptPanels<T>,
 }
 
+/// Unknowns of a parallel task.
+const UNKNOWNS: usize = 4096;
+
 /// How a complex system is represented in the numbers of a factor.
 pub(super) trait Representation: FactorScalar + 'static {
     /// The entry of the factored matrix for an entry of `K`.
@@ -59,13 +62,15 @@ macro_rules! complex_representation {
             }
 
             fn columns(r: &[c64], scale: &[f64], factor: f64) -> Vec<Self> {
-                r.iter().zip(scale).map(|(&r, s)| Self::of_entry(r * (s * factor))).collect()
+                let scaled = r.par_iter().zip(scale).with_min_len(UNKNOWNS);
+                scaled.map(|(&r, s)| Self::of_entry(r * (s * factor))).collect()
             }
 
             fn read(columns: &[Self], scale: &[f64], factor: f64, z: &mut [c64]) {
-                for ((z, x), s) in z.iter_mut().zip(columns).zip(scale) {
+                let solved = z.par_iter_mut().zip(columns).zip(scale).with_min_len(UNKNOWNS);
+                solved.for_each(|((z, x), s)| {
                     *z = c64::new(f64::from(x.re), f64::from(x.im)) * (s / factor);
-                }
+                });
             }
         }
     };
@@ -79,17 +84,17 @@ macro_rules! real_representation {
             }
 
             fn columns(r: &[c64], scale: &[f64], factor: f64) -> Vec<Self> {
-                let mut columns = Vec::with_capacity(2 * r.len());
-                columns.extend(r.iter().zip(scale).map(|(r, s)| (r.re * (s * factor)) as $real));
-                columns.extend(r.iter().zip(scale).map(|(r, s)| (r.im * (s * factor)) as $real));
-                columns
+                let scaled = || r.par_iter().zip(scale).with_min_len(UNKNOWNS);
+                let re = scaled().map(|(r, s)| (r.re * (s * factor)) as $real);
+                re.chain(scaled().map(|(r, s)| (r.im * (s * factor)) as $real)).collect()
             }
 
             fn read(columns: &[Self], scale: &[f64], factor: f64, z: &mut [c64]) {
                 let (re, im) = columns.split_at(z.len());
-                for (((z, &re), &im), s) in z.iter_mut().zip(re).zip(im).zip(scale) {
+                let solved = z.par_iter_mut().zip(re.par_iter().zip(im)).zip(scale).with_min_len(UNKNOWNS);
+                solved.for_each(|((z, (&re, &im)), s)| {
                     *z = c64::new(f64::from(re), f64::from(im)) * (s / factor);
-                }
+                });
             }
         }
     };
@@ -179,11 +184,7 @@ impl Unscaled {
 impl Precondition for Unscaled {
     fn apply(&self, r: &[c64], z: &mut [c64]) {
         let factor = magnification(r);
-        let mut column: Vec<c32> = r.par_iter().map(|r| c32::of_entry(r * factor)).collect();
-        self.0.solve_in_place(&mut column);
-        z.par_iter_mut().zip(&column).for_each(|(z, x)| {
-            *z = double(*x) / factor;
-        });
+        self.0.solve(|i| c32::of_entry(r[i] * factor), z, |x| double(x) / factor);
     }
 
     fn bytes(&self) -> usize {

@@ -13,14 +13,24 @@ use super::{Incomplete, Number};
 const ROWS: usize = 4096;
 
 impl<T: Number> Incomplete<T> {
-    /// Solves with the factor in place, in the order of the matrix.
+    /// Solves for the right side `value(i)`, and overwrites `x` with what `taken` makes of the solution, both in the order of the
+    /// matrix.
     ///
     /// # Panics
     /// If the length of `x` is not the number of unknowns.
-    pub fn solve_in_place(&self, x: &mut [T]) {
+    pub fn solve<X: Send>(
+        &self,
+        value: impl Fn(usize) -> T + Sync,
+        x: &mut [X],
+        taken: impl Fn(T) -> X + Sync,
+    ) {
+        let analysis = &*self.analysis;
+        assert_eq!(x.len(), analysis.size(), "a value for every unknown");
         let mut y = vec![T::default(); x.len()];
-        self.solve_gathered(&mut y, |old| x[old]);
-        self.spread(&y, x);
+        self.solve_gathered(&mut y, value);
+        x.par_iter_mut().zip(&analysis.inverse).with_min_len(ROWS).for_each(|(x, &new)| {
+            *x = taken(y[new as usize] * self.scales[new as usize]);
+        });
     }
 
     /// Writes the solution for the right side `value(old)` to `y`, in the order of elimination.
@@ -104,13 +114,6 @@ impl<T: Number> Incomplete<T> {
             Some(s) => self.analysis.splits[s][1] as usize,
         };
         (range.start..split, split..range.end)
-    }
-
-    /// Writes a solution in the order of elimination to that of the matrix.
-    fn spread(&self, y: &[T], x: &mut [T]) {
-        x.par_iter_mut().zip(&self.analysis.inverse).with_min_len(ROWS).for_each(|(x, &new)| {
-            *x = y[new as usize] * self.scales[new as usize];
-        });
     }
 }
 

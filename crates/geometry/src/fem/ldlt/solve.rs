@@ -8,7 +8,8 @@
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
-use super::factor::Ldlt;
+use super::analysis::LdltAnalysis;
+use super::factor::{FactoredPanel, Ldlt};
 use super::panel_solve::{Backward, Block, Forward, Subtract, SubtractTransposed, by_pairs};
 use super::panels::Panel;
 use super::scalar::PanelScalar;
@@ -16,6 +17,9 @@ use super::schedule::{Branch, Task, for_each_in_parallel};
 
 /// Entries above which the parts of a panel of a chain are parallel tasks: some 50 µs of memory traffic.
 const LARGE_PANEL: usize = 1 << 16;
+
+/// Unknowns whose values are brought into the order of elimination, or out of it, by one task.
+const UNKNOWNS: usize = 4096;
 
 /// Rows, respectively columns, of the parts of a large panel.
 const PART_ROWS: usize = 256;
@@ -29,19 +33,24 @@ pub(super) fn solve_in_place<T: PanelScalar>(factor: &Ldlt<T>, columns: &mut [T]
     }
     assert_eq!(columns.len() % n, 0, "whole columns");
     let count = columns.len() / n;
-    let order = &factor.analysis.order;
-    let mut x = Vec::with_capacity(n * count);
-    x.extend(order.iter().flat_map(|&old| columns.iter().skip(old as usize).step_by(n)).copied());
+    let LdltAnalysis { order, inverse, tasks, .. } = &*factor.analysis;
+    let mut x = vec![T::default(); n * count];
+    let parts = x.chunks_mut(UNKNOWNS * count).zip(order.chunks(UNKNOWNS)).collect();
+    for_each_in_parallel(parts, |(x, order): (&mut [T], &[u32])| {
+        for (x, &old) in x.chunks_exact_mut(count).zip(order) {
+            x.iter_mut().enumerate().for_each(|(side, x)| *x = columns[side * n + old as usize]);
+        }
+    });
     let sweep = Sweep { factor, count, workspaces: Mutex::new(Vec::new()) };
-    sweep.forward_branch(&factor.analysis.tasks, &mut x);
-    let inverse_pivots = factor.panels.iter().flat_map(|panel| &panel.inverse_pivots);
-    for (x, &inverse) in x.chunks_exact_mut(count).zip(inverse_pivots) {
-        x.iter_mut().for_each(|x| *x *= inverse);
-    }
-    sweep.backward_branch(&factor.analysis.tasks, &mut x, &[]);
-    for (x, &old) in x.chunks_exact(count).zip(order) {
-        columns.iter_mut().skip(old as usize).step_by(n).zip(x).for_each(|(column, &x)| *column = x);
-    }
+    sweep.forward_branch(tasks, &mut x);
+    sweep.backward_branch(tasks, &mut x, &[]);
+    let column_parts = columns.chunks_exact_mut(n).enumerate();
+    let parts = column_parts.flat_map(|(side, column)| {
+        column.chunks_mut(UNKNOWNS).zip(inverse.chunks(UNKNOWNS)).map(move |part| (side, part))
+    });
+    for_each_in_parallel(parts.collect(), |(side, (column, inverse)): (usize, (&mut [T], &[u32]))| {
+        column.iter_mut().zip(inverse).for_each(|(value, &new)| *value = x[new as usize * count + side]);
+    });
 }
 
 /// Scratch memory of one thread.
@@ -264,7 +273,7 @@ impl<T: PanelScalar> Sweep<'_, T> {
         }
     }
 
-    /// `x_J −= L_Rᵀ x_R`, then `x_J ← L_J⁻ᵀ x_J`.
+    /// `x_J ← D_J⁻¹ x_J`, `x_J −= L_Rᵀ x_R`, then `x_J ← L_J⁻ᵀ x_J`.
     fn backward_panel(
         &self,
         p: usize,
@@ -274,13 +283,14 @@ impl<T: PanelScalar> Sweep<'_, T> {
         workspace: &mut Workspace<T>,
     ) {
         let panel = self.panel(p);
-        let entries = self.factor.panels[p].entries.as_slice();
+        let FactoredPanel { entries, inverse_pivots, .. } = &*self.factor.panels[p];
+        let entries = entries.as_slice();
         let (width, height, count) = (panel.width, panel.height(), self.count);
         let Workspace { outside, sides } = workspace;
         sides.clear();
         for side in 0..count {
             let own_unknowns = x[(panel.start - own.start) * count..].iter().skip(side).step_by(count);
-            sides.extend(own_unknowns.take(width));
+            sides.extend(own_unknowns.zip(inverse_pivots).map(|(&x, &inverse)| x * inverse));
             let rows = self.rows(p)[width..].iter();
             sides.extend(rows.map(|&row| self.at(row as usize, x, own, outside)[side]));
         }
