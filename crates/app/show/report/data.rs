@@ -13,7 +13,7 @@ use super::field_file::{contents, field_contents};
 use crate::build::{Outline, build_mesh, outline};
 use crate::config::{Config, FieldsKept, MeshConfig, SourceMap};
 use crate::error::Error;
-use crate::files::{Manifest, MeshHash, OutputError, Refinements, RunDirectory, RunResult};
+use crate::files::{Accuracy, Manifest, MeshHash, OutputError, Refinements, RunDirectory, RunResult};
 use crate::run::journal::{Journal, mesh_hash};
 use crate::show::Evaluation;
 
@@ -61,6 +61,11 @@ pub(super) struct Snapshot {
 }
 
 impl RunData {
+    /// How exact the objective is, where that is known.
+    pub(super) fn accuracy(&self) -> Option<&Accuracy> {
+        self.result.as_ref()?.accuracy.as_ref()
+    }
+
     /// Reads the directory.
     ///
     /// # Errors

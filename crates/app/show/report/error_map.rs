@@ -39,8 +39,7 @@ fn drawn(data: &RunData, outline: &Outline, field: &Snapshot, error: &[f64]) -> 
         flux_density: densities,
         deviation: None,
     };
-    let accuracy = data.result.as_ref().and_then(|result| result.accuracy.as_ref());
-    let estimate = accuracy.and_then(|accuracy| accuracy.error_estimate).map(|[_, best]| best);
+    let estimate = data.accuracy().and_then(|accuracy| accuracy.error_estimate).map(|[_, best]| best);
     let window = Window::new(data, outline, field);
     let cut = FieldCut::new(&window, outline, &shares);
     let values = cut.triangles.iter().flat_map(|triangle| triangle.patch.map(|(_, value)| value));

@@ -89,9 +89,8 @@ fn run_cards(data: &RunData, objective: Option<&ObjectiveResult>) -> Vec<Card> {
         cards.push(("objective F / F₀", ticks::ratio(ratio), remark));
     }
     cards.extend(objective.map(|objective| finer_mesh_card(data, objective)));
-    let accuracy = data.result.as_ref().and_then(|result| result.accuracy.as_ref());
     cards.extend(
-        objective.zip(accuracy).and_then(|(objective, accuracy)| gain_card(data, objective, accuracy)),
+        objective.zip(data.accuracy()).and_then(|(objective, accuracy)| gain_card(data, objective, accuracy)),
     );
     let (evaluations, iterations) = match (&data.result, data.history.last()) {
         (Some(result), _) => (result.evaluations, result.iterations),

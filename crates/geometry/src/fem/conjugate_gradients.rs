@@ -4,7 +4,7 @@
 //! threads.
 
 use crate::fem::csr::CsrMatrix;
-use crate::fem::scalar::{dot, norm, ordered_sum};
+use crate::fem::scalar::{advance, dot, dots, norm, ordered_sum, scale_add};
 
 /// What an iterative solution reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,8 +106,9 @@ fn descend(
     precondition(r, &mut z);
     let mut direction = z.clone();
     let mut slope = dot(r, &z);
+    let mut size = norm(r);
     for iteration in 0..max_iterations {
-        if norm(r) <= target || !slope.is_finite() {
+        if size <= target || !slope.is_finite() {
             return iteration;
         }
         matrix.mul(&direction, &mut product);
@@ -115,13 +116,11 @@ fn descend(
         if !step.is_finite() {
             return iteration;
         }
-        x.iter_mut().zip(&direction).for_each(|(x, p)| *x += step * p);
-        r.iter_mut().zip(&product).for_each(|(r, q)| *r -= step * q);
+        size = advance(step, (&mut *x, &direction), (&mut *r, &product));
         precondition(r, &mut z);
         // r⁺ − r = −step A p.
-        let fresh = dot(r, &z);
-        let beta = -step * dot(&z, &product) / slope;
-        direction.iter_mut().zip(&z).for_each(|(p, z)| *p = z + beta * *p);
+        let [fresh, change] = dots(&z, [&*r, &product]);
+        scale_add(-step * change / slope, &mut direction, &z);
         slope = fresh;
     }
     max_iterations

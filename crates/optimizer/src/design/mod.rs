@@ -375,16 +375,16 @@ impl DesignSurface {
         self.rows.iter().map(|row| row.iter().map(|&(k, weight)| weight * p[k]).sum()).collect()
     }
 
-    /// How many nodes have rows of their own; those behind them are in the middle of edges.
-    fn row_count(&self) -> usize {
+    /// The place of the first node in the middle of an edge, behind all that move by their own steps.
+    fn first_middle(&self) -> usize {
         self.nodes.len() - self.ends.len()
     }
 
-    /// `Δx_b = D M W p` [m], one displacement per node.
+    /// `Δx_b = D M W p` [m], one displacement per node; of a node in the middle of an edge the mean of those of its ends.
     pub fn displacement(&self, p: &[f64]) -> Vec<Point> {
         let along = self.normal_displacements(p);
         let step = |i: usize| self.directions[i].map(|d| self.mitres[i] * along[i] * d);
-        let mut displacement: Vec<Point> = (0..self.row_count()).map(step).collect();
+        let mut displacement: Vec<Point> = (0..self.first_middle()).map(step).collect();
         for &[a, b] in &self.ends {
             let (a, b) = (displacement[a], displacement[b]);
             displacement.push(std::array::from_fn(|d| 0.5 * (a[d] + b[d])));
@@ -395,13 +395,13 @@ impl DesignSurface {
     /// `Wᵀ M Dᵀ g`: from derivatives with respect to the nodes' positions to those with respect to the variables.
     pub fn gradient(&self, nodal: &[Point]) -> Vec<f64> {
         let mut nodal = nodal.to_vec();
-        let rows = self.row_count();
-        for (new, ends) in self.ends.iter().enumerate().rev() {
-            let half = nodal[rows + new].map(|g| 0.5 * g);
+        let middles = self.first_middle();
+        for (new, ends) in (middles..self.nodes.len()).zip(&self.ends).rev() {
+            let half = nodal[new].map(|g| 0.5 * g);
             ends.iter().for_each(|&end| (0..3).for_each(|d| nodal[end][d] += half[d]));
         }
         let mut gradient = vec![0.0; self.variable_count()];
-        for (place, g) in nodal.into_iter().enumerate().take(rows) {
+        for (place, g) in nodal.into_iter().enumerate().take(middles) {
             self.slopes(place, g, &mut |k, slope| gradient[k] += slope);
         }
         gradient
@@ -410,7 +410,7 @@ impl DesignSurface {
     /// Hands out the variables that move the node at a place of [`Self::nodes`], some of them repeatedly, each with its part of the
     /// derivative of what has the derivative `g` with respect to the position of that node.
     pub fn slopes(&self, place: usize, g: Point, add: &mut impl FnMut(usize, f64)) {
-        if let Some(new) = place.checked_sub(self.row_count()) {
+        if let Some(new) = place.checked_sub(self.first_middle()) {
             self.ends[new].iter().for_each(|&end| self.slopes(end, g.map(|g| 0.5 * g), add));
         } else {
             let along = self.mitres[place] * dot(self.directions[place], g);

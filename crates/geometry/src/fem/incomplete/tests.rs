@@ -44,7 +44,8 @@ fn without_fill_it_is_the_exact_factor() {
     assert_eq!(analysis.entry_count(), n - 1);
     let factor = Incomplete::new(&analysis, |_, k| a.values[k], 1.0).expect("it is regular");
     let exact = vector(n, 0.37);
-    let [mut b, mut x] = [(); 2].map(|()| vec![Complex64::default(); n]);
+    let mut b = vec![Complex64::default(); n];
+    let mut x = b.clone();
     a.mul(&exact, &mut b);
     factor.solve(|i| b[i], &mut x, |x| x);
     let error = x.iter().zip(&exact).map(|(x, e)| (x - e).norm()).fold(0.0, f64::max);
